@@ -1,0 +1,1 @@
+//! How good a mesh is: one definition of each figure for all.

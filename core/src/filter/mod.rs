@@ -1,0 +1,1 @@
+//! From registered scans to one cloud with uncertainty.

@@ -1,0 +1,22 @@
+//! Points, poses, boxes, clouds and the searches over them.
+
+mod aabb;
+mod cloud;
+mod fit;
+mod kdtree;
+mod pose;
+mod surface;
+
+pub use aabb::Aabb;
+pub use cloud::{Cloud, Scan};
+pub use fit::{PlaneFit, any_orthogonal, fit_plane};
+pub use kdtree::KdTree;
+pub use pose::{
+    Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,
+};
+pub use surface::{Projection, Surface};
+
+/// A point or vector, metres.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3 x 3 matrix.
+pub type Mat3 = nalgebra::Matrix3<f64>;

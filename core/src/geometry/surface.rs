@@ -1,0 +1,80 @@
+//! Searches over the triangles of a fixed surface. The only file that knows parry3d's types.
+
+use super::{Aabb, Vec3};
+use crate::{Error, Result};
+use parry3d_f64::bounding_volume::Aabb as ParryAabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
+use parry3d_f64::shape::TriMesh;
+
+/// Triangles in a bounding-volume hierarchy.
+pub struct Surface {
+    mesh: TriMesh,
+}
+
+/// The point of a surface nearest to a query.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// The nearest point, metres.
+    pub point: Vec3,
+    /// Its distance to the query, metres.
+    pub distance: f64,
+    /// The triangle that it lies on.
+    pub triangle: usize,
+}
+
+impl Surface {
+    /// Builds the hierarchy over `triangles`, which index `vertices` (metres).
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is no triangle.
+    pub fn new(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Result<Surface> {
+        let points = vertices.iter().map(to_parry).collect();
+        let mesh = TriMesh::new(points, triangles.to_vec())
+            .map_err(|e| Error::input(format!("the surface has no usable triangle: {e}")))?;
+        Ok(Surface { mesh })
+    }
+
+    /// The nearest point of the surface.
+    pub fn project(&self, query: &Vec3) -> Projection {
+        let (projection, (triangle, _)) =
+            self.mesh.project_local_point_and_get_location(to_parry(query), false);
+        let point = from_parry(projection.point);
+        Projection { point, distance: (point - query).norm(), triangle: triangle as usize }
+    }
+
+    /// The distance to the nearest point of the surface, metres.
+    pub fn distance(&self, query: &Vec3) -> f64 {
+        self.mesh.distance_to_local_point(to_parry(query), false)
+    }
+
+    /// The first triangle that the ray from `origin` along the unit vector `direction` meets within
+    /// `max_distance`: distance (metres) and triangle.
+    pub fn cast_ray(
+        &self,
+        origin: &Vec3,
+        direction: &Vec3,
+        max_distance: f64,
+    ) -> Option<(f64, usize)> {
+        let ray = Ray::new(to_parry(origin), to_parry(direction));
+        let hit = self.mesh.cast_local_ray_and_get_normal(&ray, max_distance, false)?;
+        // Both faces of triangle i can be hit; parry numbers the back faces from n on.
+        Some((hit.time_of_impact, hit.feature.unwrap_face() as usize % self.mesh.num_triangles()))
+    }
+
+    /// Indices of the triangles whose bounding boxes touch `aabb`, ascending.
+    pub fn triangles_near(&self, aabb: &Aabb) -> Vec<u32> {
+        let query = ParryAabb::new(to_parry(&aabb.min), to_parry(&aabb.max));
+        let mut found: Vec<u32> = self.mesh.bvh().intersect_aabb(&query).collect();
+        found.sort_unstable();
+        found
+    }
+}
+
+fn to_parry(v: &Vec3) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+fn from_parry(v: Vector) -> Vec3 {
+    Vec3::new(v.x, v.y, v.z)
+}

@@ -1,0 +1,26 @@
+//! Every algorithm of puffer, without ROS, clock or printing.
+//!
+//! A module may use only the modules that stand above it in this list; a test checks that. Lengths are
+//! metres, angles radians, and transforms are named `a_from_b`.
+
+pub mod error;
+pub mod params;
+pub mod progress;
+
+pub mod geometry;
+pub mod mesh;
+pub mod scans;
+pub mod voxel;
+
+pub mod register;
+
+pub mod filter;
+
+pub mod reconstruct;
+
+pub mod simulate;
+
+pub mod assess;
+
+pub use error::{Error, Result};
+pub use progress::Progress;

@@ -1,0 +1,230 @@
+//! Parameters with one source: default, range, unit and description stand on the struct field, and the
+//! YAML, the `--help` texts and the reference table are made from them.
+
+use crate::{Error, Result};
+use serde_json::Value;
+
+/// What is known of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamSpec {
+    /// Full name, `group.field`.
+    pub name: String,
+    /// "float", "integer", "boolean" or "choice".
+    pub kind: &'static str,
+    /// Value when the user gives none.
+    pub default: Value,
+    /// Smallest and largest value allowed, for numbers.
+    pub range: Option<[f64; 2]>,
+    /// Words allowed, for choices.
+    pub choices: &'static [&'static str],
+    /// SI unit, empty if there is none.
+    pub unit: &'static str,
+    /// One sentence.
+    pub description: String,
+}
+
+/// A type that a parameter can have.
+pub trait ParamValue: Sized {
+    /// As in [`ParamSpec::kind`].
+    const KIND: &'static str;
+    /// As in [`ParamSpec::choices`].
+    const CHOICES: &'static [&'static str] = &[];
+    /// The value as JSON.
+    fn to_value(&self) -> Value;
+    /// Reads the value; `None` if the JSON has another type or the word is not among the choices.
+    fn from_value(value: &Value) -> Option<Self>;
+    /// The value as a number, to be held against the range.
+    fn as_number(&self) -> Option<f64> {
+        None
+    }
+}
+
+impl ParamValue for f64 {
+    const KIND: &'static str = "float";
+    fn to_value(&self) -> Value {
+        Value::from(*self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_f64()
+    }
+    fn as_number(&self) -> Option<f64> {
+        Some(*self)
+    }
+}
+
+impl ParamValue for usize {
+    const KIND: &'static str = "integer";
+    fn to_value(&self) -> Value {
+        Value::from(*self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_u64().and_then(|v| usize::try_from(v).ok())
+    }
+    fn as_number(&self) -> Option<f64> {
+        Some(*self as f64)
+    }
+}
+
+impl ParamValue for bool {
+    const KIND: &'static str = "boolean";
+    fn to_value(&self) -> Value {
+        Value::from(*self)
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_bool()
+    }
+}
+
+/// Reads one field; used by [`params!`].
+///
+/// # Errors
+/// [`Error::Parameter`] if the type is wrong or the value out of range.
+pub fn read_field<T: ParamValue>(name: &str, value: &Value, range: Option<[f64; 2]>) -> Result<T> {
+    let parameter = |message: String| Error::Parameter { name: name.to_owned(), message };
+    let parsed = T::from_value(value).ok_or_else(|| {
+        parameter(match T::CHOICES {
+            [] => format!("{value} is not of type {}", T::KIND),
+            choices => format!("{value} is not one of {}", choices.join(", ")),
+        })
+    })?;
+    if let (Some([low, high]), Some(number)) = (range, parsed.as_number())
+        && !(low..=high).contains(&number)
+    {
+        return Err(parameter(format!("{number} is out of range; allowed are {low} to {high}")));
+    }
+    Ok(parsed)
+}
+
+/// Declares an enum whose variants are the words that a choice parameter may take.
+#[macro_export]
+macro_rules! choice {
+    ($(#[$meta:meta])* pub enum $name:ident { $($(#[$vmeta:meta])* $variant:ident = $word:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name { $($(#[$vmeta])* $variant,)* }
+
+        impl $crate::params::ParamValue for $name {
+            const KIND: &'static str = "choice";
+            const CHOICES: &'static [&'static str] = &[$($word),*];
+            fn to_value(&self) -> serde_json::Value {
+                serde_json::Value::from(match self { $($name::$variant => $word,)* })
+            }
+            fn from_value(value: &serde_json::Value) -> Option<Self> {
+                match value.as_str()? { $($word => Some($name::$variant),)* _ => None }
+            }
+        }
+    };
+}
+
+/// Declares a parameter struct; each field bears its default, range, unit and description.
+#[macro_export]
+macro_rules! params {
+    ($(#[$meta:meta])* pub struct $name:ident($group:literal) {
+        $($(#[doc = $doc:literal])* $field:ident: $type:ty = $default:expr
+            $(, in [$low:expr, $high:expr])? $(, unit $unit:literal)?;)*
+    }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct $name { $($(#[doc = $doc])* pub $field: $type,)* }
+
+        impl Default for $name {
+            fn default() -> Self { Self { $($field: $default,)* } }
+        }
+
+        impl $name {
+            /// Name of the group in a parameter file.
+            pub const GROUP: &'static str = $group;
+
+            /// What is known of each parameter, in the order of declaration.
+            pub fn specs() -> Vec<$crate::params::ParamSpec> {
+                let defaults = Self::default();
+                vec![$($crate::params::ParamSpec {
+                    name: concat!($group, ".", stringify!($field)).to_owned(),
+                    kind: <$type as $crate::params::ParamValue>::KIND,
+                    default: $crate::params::ParamValue::to_value(&defaults.$field),
+                    range: $crate::params!(@range $([$low, $high])?),
+                    choices: <$type as $crate::params::ParamValue>::CHOICES,
+                    unit: concat!("" $(, $unit)?),
+                    description: [$($doc),*].concat().trim().to_owned(),
+                }),*]
+            }
+
+            /// Sets one field from JSON.
+            ///
+            /// # Errors
+            /// [`Error::Parameter`](crate::Error::Parameter) if there is no such field, or the value has
+            /// the wrong type or is out of range.
+            pub fn set(&mut self, field: &str, value: &serde_json::Value) -> $crate::Result<()> {
+                match field {
+                    $(stringify!($field) => {
+                        self.$field = $crate::params::read_field(
+                            concat!($group, ".", stringify!($field)), value,
+                            $crate::params!(@range $([$low, $high])?))?;
+                    })*
+                    _ => return Err($crate::Error::Parameter {
+                        name: format!("{}.{field}", $group),
+                        message: format!("unknown; {} has {}", $group, [$(stringify!($field)),*].join(", ")),
+                    }),
+                }
+                Ok(())
+            }
+
+            /// The values as JSON, in the order of declaration.
+            pub fn values(&self) -> Vec<(&'static str, serde_json::Value)> {
+                vec![$((stringify!($field), $crate::params::ParamValue::to_value(&self.$field))),*]
+            }
+        }
+    };
+    (@range) => { None };
+    (@range [$low:expr, $high:expr]) => { Some([$low as f64, $high as f64]) };
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    crate::choice! {
+        /// A colour.
+        pub enum Colour {
+            /// Red.
+            Red = "red",
+            /// Green.
+            Green = "green",
+        }
+    }
+
+    crate::params! {
+        /// For the tests.
+        pub struct Sample("sample") {
+            /// How far.
+            reach: f64 = 0.5, in [0.0, 1.0], unit "m";
+            /// How many.
+            count: usize = 3, in [1, 10];
+            /// Which.
+            colour: Colour = Colour::Red;
+        }
+    }
+
+    #[test]
+    fn a_field_is_read_held_against_its_range_and_described() {
+        let mut sample = Sample::default();
+        sample.set("reach", &json!(0.25)).unwrap();
+        sample.set("count", &json!(7)).unwrap();
+        sample.set("colour", &json!("green")).unwrap();
+        assert_eq!(sample, Sample { reach: 0.25, count: 7, colour: Colour::Green });
+        for (field, value, says) in [
+            ("reach", json!(2.0), "out of range; allowed are 0 to 1"),
+            ("count", json!(2.5), "not of type integer"),
+            ("colour", json!("blue"), "red, green"),
+            ("speed", json!(1), "unknown; sample has reach, count, colour"),
+        ] {
+            let error = sample.set(field, &value).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+        let specs = Sample::specs();
+        assert_eq!(specs[0].name, "sample.reach");
+        assert_eq!(specs[0].description, "How far.");
+        assert_eq!(specs[0].unit, "m");
+        assert_eq!(specs[1].range, Some([1.0, 10.0]));
+    }
+}

@@ -1,0 +1,1 @@
+//! From a filtered cloud to a watertight mesh with confidence.

@@ -1,0 +1,1 @@
+//! Scan folders and other files that hold scans with their poses.

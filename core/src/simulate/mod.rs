@@ -1,0 +1,1 @@
+//! Simulated objects, sensors and robots.
