@@ -221,6 +221,8 @@ mod tests {
             let error = sample.set(field, &value).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");
         }
+        assert_eq!(Sample::GROUP, "sample");
+        assert_eq!(sample.values()[1], ("count", json!(7)));
         let specs = Sample::specs();
         assert_eq!(specs[0].name, "sample.reach");
         assert_eq!(specs[0].description, "How far.");

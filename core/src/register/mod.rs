@@ -1,1 +1,109 @@
-//! Registration of scans.
+//! Registration of scans (Wiedemann 2014, §2.3.1).
+//!
+//! Two stages, as in the thesis: each scan is aligned to the scans registered before it; those put aside are
+//! tried again until none is left or nothing changes. By default the alignment is point-to-plane with the
+//! robot's pose as prior (maximum a posteriori), so that directions which the geometry leaves open stay where
+//! the robot says, and a joint optimisation over all accepted scans spreads the remaining error.
+
+mod align;
+mod factors;
+mod joint;
+mod prepare;
+mod sigma;
+mod stages;
+mod verdict;
+
+pub use prepare::PreparedScan;
+pub(crate) use prepare::median;
+pub use sigma::PoseSigma;
+pub use verdict::{Status, Verdict};
+
+use crate::geometry::Pose;
+use crate::{Error, Progress, Result};
+
+crate::choice! {
+    /// How scans are aligned.
+    pub enum Method {
+        /// Point-to-plane, robust, with the robot's pose as prior.
+        PointToPlane = "point_to_plane",
+        /// The thesis's: point-to-point within a fixed radius, normals compared, no prior.
+        Thesis = "thesis",
+    }
+}
+
+crate::params! {
+    /// Parameters of the registration.
+    pub struct RegisterParams("register") {
+        /// How scans are aligned.
+        method: Method = Method::PointToPlane;
+        /// Search radius for correspondences at the start; 0 takes it from the pose's standard deviation.
+        radius: f64 = 0.0, in [0.0, 1.0], unit "m";
+        /// Pairs whose normals differ by more are rejected.
+        max_normal_angle: f64 = 0.785, in [0.0, 3.15], unit "rad";
+        /// A scan with fewer correspondences is put aside.
+        min_correspondences: usize = 200, in [6, 1000000];
+        /// A scan of which a smaller share finds correspondences is put aside.
+        min_overlap: f64 = 0.1, in [0.0, 1.0];
+        /// Points sampled from each scan.
+        samples: usize = 4000, in [50, 1000000];
+        /// Iterations of one alignment at most.
+        max_iterations: usize = 60, in [1, 1000];
+        /// Rounds over the scans put aside at most.
+        max_rounds: usize = 5, in [1, 100];
+        /// What a correspondence counts for beside the prior; below 1 because neighbours share their noise.
+        information_share: f64 = 0.1, in [0.0001, 1.0];
+        /// Corrections beyond this many standard deviations of the prior are deferred, then refused.
+        max_correction: f64 = 3.0, in [0.5, 100.0];
+        /// Whether all accepted scans are optimised together at the end.
+        joint: bool = true;
+        /// Passes of the joint optimisation at most, each with new correspondences.
+        joint_iterations: usize = 20, in [1, 1000];
+    }
+}
+
+/// The registered scans: one entry a view in each list.
+#[derive(Clone, Debug)]
+pub struct Registration {
+    /// Estimated `object_from_sensor`.
+    pub poses: Vec<Pose>,
+    /// What became of each scan.
+    pub verdicts: Vec<Verdict>,
+    /// Standard deviation of the given poses that was used.
+    pub pose_sigma: PoseSigma,
+    /// Root mean square point-to-plane distance between overlapping scans, metres; NaN with one scan.
+    pub residual: f64,
+}
+
+/// Registers `scans` (sensor frame), starting from the robot's poses `object_from_sensor`.
+///
+/// `pose_sigma` is the robot's; without one it is estimated from how far the scans lie apart.
+///
+/// # Errors
+/// [`Error::Input`] if there is no scan, or not a pose for each; [`Error::Cancelled`].
+pub fn register(
+    scans: &[PreparedScan],
+    robot: &[Pose],
+    pose_sigma: Option<PoseSigma>,
+    params: &RegisterParams,
+    progress: &Progress,
+) -> Result<Registration> {
+    if scans.is_empty() || scans.len() != robot.len() {
+        return Err(Error::input(format!(
+            "{} scans with {} poses: each scan needs one pose",
+            scans.len(),
+            robot.len()
+        )));
+    }
+    let samples: Vec<joint::Sample> =
+        scans.iter().map(|s| joint::Sample::new(s, params.samples)).collect();
+    let pose_sigma = pose_sigma.unwrap_or_else(|| sigma::estimate(&samples, robot));
+    let mut registration = stages::two_stages(&samples, robot, pose_sigma, params, progress)?;
+    if params.joint && params.method != Method::Thesis {
+        joint::optimise(&samples, robot, &mut registration, params, progress)?;
+    }
+    registration.residual = joint::residual(&samples, &registration);
+    Ok(registration)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,241 @@
+//! From a raw scan to oriented points in the sensor frame.
+
+use crate::geometry::{KdTree, Scan, Vec3, fit_plane};
+use crate::voxel::CellIndex;
+use crate::{Error, Result};
+use rayon::prelude::*;
+
+/// Oriented points of one scan, in the sensor frame.
+#[derive(Clone, Debug, Default)]
+pub struct PreparedScan {
+    /// Points, metres.
+    pub points: Vec<Vec3>,
+    /// Unit normals, towards the sensor.
+    pub normals: Vec<Vec3>,
+    /// Unit vectors along the rays, away from the sensor.
+    pub rays: Vec<Vec3>,
+    /// Median distance between neighbouring points, metres.
+    pub spacing: f64,
+    /// Standard deviation of the points about their local planes, metres.
+    pub noise: f64,
+}
+
+/// Points sampled to learn a scan's spacing and noise: enough for a median to 3 %.
+const PROBES: usize = 1500;
+/// Fewer neighbours than this support no plane.
+const LEAST_NEIGHBOURS: usize = 6;
+/// Beyond this angle of incidence a "surface" is mostly flying points between two depths.
+const GRAZING: f64 = 80.0;
+/// Points of a scan that are kept at most: above, neighbours are merged, which loses no information because
+/// such scans are far denser than the finest mesh made of them.
+const MOST_POINTS: usize = 200_000;
+
+impl PreparedScan {
+    /// Estimates normals and noise; points without enough neighbours, off their local plane or at grazing
+    /// incidence are left out.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if fewer than 10 points have a return or all coincide.
+    pub fn new(scan: &Scan) -> Result<PreparedScan> {
+        let (points, rays) = thinned(scan);
+        if points.len() < 10 {
+            return Err(Error::input(format!(
+                "the scan has {} points with a return; at least 10 are needed",
+                points.len()
+            )));
+        }
+        let spacing = median_spacing(&points);
+        if spacing <= 0.0 {
+            return Err(Error::input("most points of the scan coincide; is the file corrupt?"));
+        }
+        let probe = Neighbourhood::new(&points, 3.0 * spacing);
+        let stride = points.len().div_ceil(PROBES);
+        let residuals =
+            (0..points.len()).step_by(stride).filter_map(|i| probe.fit(i)).map(|f| f.noise);
+        let noise = median(residuals.collect()).unwrap_or(0.0);
+        // The tilt of a plane fitted to n points within r is about 2 noise / (r sqrt(n)): six times the noise
+        // keeps it to a few degrees.
+        let radius = (3.0 * spacing).max(6.0 * noise);
+        let fits = Neighbourhood::new(&points, radius);
+        let oriented: Vec<Option<Vec3>> = (0..points.len())
+            .into_par_iter()
+            .map(|i| oriented_normal(&fits, i, &rays[i], noise))
+            .collect();
+        let mut prepared = PreparedScan { spacing, noise, ..PreparedScan::default() };
+        for (i, normal) in oriented.into_iter().enumerate() {
+            if let Some(normal) = normal {
+                prepared.points.push(points[i]);
+                prepared.normals.push(normal);
+                prepared.rays.push(rays[i]);
+            }
+        }
+        Ok(prepared)
+    }
+
+    /// One point a cubic cell, so that about `count` remain: indices, ascending by cell.
+    pub fn sample(&self, count: usize) -> Vec<usize> {
+        if self.points.len() <= count {
+            return (0..self.points.len()).collect();
+        }
+        let mut edge = self.spacing * (self.points.len() as f64 / count as f64).sqrt();
+        loop {
+            let cells = CellIndex::new(&self.points, edge);
+            if cells.cells().len() as f64 <= 1.2 * count as f64 {
+                return cells
+                    .cells()
+                    .iter()
+                    .map(|c| most_central(&self.points, cells.points_in(*c)))
+                    .collect();
+            }
+            edge *= 1.15;
+        }
+    }
+}
+
+fn most_central(points: &[Vec3], members: &[u32]) -> usize {
+    let mean = members.iter().map(|&i| points[i as usize]).sum::<Vec3>() / members.len() as f64;
+    let distance = |i: u32| (points[i as usize] - mean).norm_squared();
+    let nearest = members.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    nearest.map_or(0, |i| i as usize)
+}
+
+fn thinned(scan: &Scan) -> (Vec<Vec3>, Vec<Vec3>) {
+    let indices: Vec<usize> = scan.returns().collect();
+    let point = |i: usize| scan.point(i).unwrap_or_else(Vec3::zeros);
+    let ray = |i: usize| (point(i) - scan.origin(i)).try_normalize(0.0).unwrap_or_else(Vec3::z);
+    if indices.len() <= MOST_POINTS {
+        return (
+            indices.iter().map(|&i| point(i)).collect(),
+            indices.iter().map(|&i| ray(i)).collect(),
+        );
+    }
+    let points: Vec<Vec3> = indices.iter().map(|&i| point(i)).collect();
+    let mut edge = median_spacing(&points) * (points.len() as f64 / MOST_POINTS as f64).sqrt();
+    if edge <= 0.0 {
+        edge = 1e-6;
+    }
+    let cells = CellIndex::new(&points, edge);
+    let merged = cells.cells().iter().map(|&cell| {
+        let members = cells.points_in(cell);
+        let count = members.len() as f64;
+        let mean = members.iter().map(|&i| points[i as usize]).sum::<Vec3>() / count;
+        let ray = members.iter().map(|&i| ray(indices[i as usize])).sum::<Vec3>() / count;
+        (mean, ray.try_normalize(0.0).unwrap_or_else(Vec3::z))
+    });
+    merged.unzip()
+}
+
+fn median_spacing(points: &[Vec3]) -> f64 {
+    let tree = KdTree::new(points);
+    let stride = points.len().div_ceil(PROBES);
+    let nearest = points
+        .iter()
+        .step_by(stride)
+        .filter_map(|p| tree.nearest_n(p, 4).last().map(|f| f.1.sqrt()));
+    // The third neighbour lies at about one grid step, also where the grid is stretched in one direction.
+    median(nearest.collect()).unwrap_or(0.0)
+}
+
+/// Median; `None` of nothing.
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return None;
+    }
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+struct Neighbourhood<'a> {
+    points: &'a [Vec3],
+    cells: CellIndex,
+    radius: f64,
+}
+
+struct LocalFit {
+    normal: Vec3,
+    center: Vec3,
+    noise: f64,
+}
+
+impl<'a> Neighbourhood<'a> {
+    fn new(points: &'a [Vec3], radius: f64) -> Self {
+        Neighbourhood { points, cells: CellIndex::new(points, radius), radius }
+    }
+
+    fn fit(&self, index: usize) -> Option<LocalFit> {
+        let mut neighbours = Vec::with_capacity(64);
+        self.cells.for_each_within(self.points, &self.points[index], self.radius, |i, _| {
+            neighbours.push(i)
+        });
+        let count = neighbours.len() as f64;
+        if neighbours.len() < LEAST_NEIGHBOURS {
+            return None;
+        }
+        let fit = fit_plane(neighbours.iter().map(|&i| (self.points[i], 1.0)))?;
+        // A neighbourhood as thick as it is wide is no surface.
+        if fit.variances[0] > 0.25 * fit.variances[1] {
+            return None;
+        }
+        let noise = (fit.variances[0] * count / (count - 3.0)).sqrt();
+        Some(LocalFit { normal: fit.normal, center: fit.center, noise })
+    }
+}
+
+fn oriented_normal(fits: &Neighbourhood, index: usize, ray: &Vec3, noise: f64) -> Option<Vec3> {
+    let fit = fits.fit(index)?;
+    let cosine = fit.normal.dot(ray);
+    if cosine.abs() < GRAZING.to_radians().cos() {
+        return None;
+    }
+    // Beyond four standard deviations only outliers are expected: one good point in 16,000.
+    let off = (fits.points[index] - fit.center).dot(&fit.normal).abs();
+    if off > 4.0 * noise.max(fit.noise) {
+        return None;
+    }
+    Some(if cosine > 0.0 { -fit.normal } else { fit.normal })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tilted_plane() -> Scan {
+        let points = (0..60 * 60)
+            .map(|i| {
+                let (x, y) = ((i % 60) as f32 * 1e-3, (i / 60) as f32 * 1e-3);
+                [x, y, 0.5 + 0.5 * x + 2e-5 * ((i * 7919) % 13) as f32]
+            })
+            .collect();
+        Scan { points, width: 60, origins: Vec::new() }
+    }
+
+    #[test]
+    fn normals_point_to_the_sensor() {
+        let prepared = PreparedScan::new(&tilted_plane()).unwrap();
+        let expected = Vec3::new(0.5, 0.0, -1.0).normalize();
+        assert!(prepared.points.len() > 3400);
+        for normal in &prepared.normals {
+            assert!(normal.dot(&expected) > 0.99);
+        }
+        assert!((prepared.spacing / 1.05e-3 - 1.0).abs() < 0.15, "{}", prepared.spacing);
+        assert!(prepared.noise > 2e-5 && prepared.noise < 1e-4, "{}", prepared.noise);
+    }
+
+    #[test]
+    fn a_lone_point_is_left_out_and_ten_are_needed() {
+        let mut scan = tilted_plane();
+        scan.points.push([0.03, 0.03, 0.3]);
+        scan.width = 0;
+        let prepared = PreparedScan::new(&scan).unwrap();
+        assert!(prepared.points.iter().all(|p| p.z > 0.4));
+        scan.points.truncate(5);
+        assert!(PreparedScan::new(&scan).unwrap_err().to_string().contains("5 points"));
+    }
+
+    #[test]
+    fn sampling_keeps_about_the_count_asked_for() {
+        let prepared = PreparedScan::new(&tilted_plane()).unwrap();
+        let sample = prepared.sample(500);
+        assert!(sample.len() > 300 && sample.len() <= 600, "{}", sample.len());
+    }
+}

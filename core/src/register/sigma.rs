@@ -1,0 +1,58 @@
+//! The uncertainty of the robot's poses.
+
+use super::joint::Sample;
+use super::median;
+use crate::geometry::{Mat6, Pose};
+
+/// Standard deviation of a pose per axis, of xi in `T_true = T exp(xi)` (sensor frame).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseSigma {
+    /// Metres.
+    pub translation: f64,
+    /// Radians.
+    pub rotation: f64,
+}
+
+/// No robot is better than this; it also keeps the information finite for poses called exact.
+const BEST_TRANSLATION: f64 = 1e-6;
+const BEST_ROTATION: f64 = 1e-6;
+
+impl PoseSigma {
+    /// The inverse of the covariance.
+    pub(crate) fn information(&self) -> Mat6 {
+        let translation = self.translation.max(BEST_TRANSLATION).powi(-2);
+        let rotation = self.rotation.max(BEST_ROTATION).powi(-2);
+        Mat6::from_diagonal(&nalgebra::Vector6::new(
+            translation,
+            translation,
+            translation,
+            rotation,
+            rotation,
+            rotation,
+        ))
+    }
+
+    /// Standard deviation of a point at `distance` (metres) from the sensor.
+    pub(crate) fn of_point(&self, distance: f64) -> f64 {
+        self.translation.hypot(self.rotation * distance)
+    }
+}
+
+/// Estimates the standard deviation from the distances between overlapping scans: their median,
+/// point-to-plane, is 0.67 standard deviations of the sum of two errors and the noise.
+pub(crate) fn estimate(samples: &[Sample], robot: &[Pose]) -> PoseSigma {
+    let mut distances = Vec::new();
+    // Scans farther apart than a twentieth of the object are no longer told from different surfaces.
+    let reach = 0.05 * samples.iter().map(|s| s.extent).fold(0.0, f64::max);
+    for (i, a) in samples.iter().enumerate() {
+        for (j, b) in samples.iter().enumerate().filter(|(j, _)| *j != i) {
+            let b_from_a = robot[j].inverse() * robot[i];
+            distances.extend(a.matches(b, &b_from_a, reach, 0.8).map(|m| m.distance.abs()));
+        }
+    }
+    let distance = median(samples.iter().map(|s| s.distance).collect()).unwrap_or(1.0);
+    let spread = median(distances).unwrap_or(0.0) / 0.67 / std::f64::consts::SQRT_2;
+    // Half of the variance to translation, half to rotation; doubled, because closest points understate it.
+    let half = (2.0 * spread / std::f64::consts::SQRT_2).max(1e-5);
+    PoseSigma { translation: half, rotation: half / distance.max(1e-3) }
+}

@@ -1,0 +1,162 @@
+use super::*;
+use crate::geometry::{Scan, Twist, Vec3, exp, log};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Points of a lumpy closed surface (no symmetry), seen from direction `k` of six.
+fn scan_of_blob(pose: &Pose, rng: &mut ChaCha8Rng) -> Scan {
+    let mut points = Vec::new();
+    for i in 0..120 {
+        for j in 0..240 {
+            let (theta, phi) = ((f64::from(i) + 0.5) * 0.0261, f64::from(j) * 0.0261);
+            let u = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            let radius =
+                0.05 * (1.0 + 0.25 * u.x * u.y + 0.2 * u.z * u.x + 0.15 * (4.0 * u.y).sin());
+            let object = u * radius + Vec3::new(0.0, 0.0, 1e-4 * rng.random_range(-1.0..1.0));
+            let seen = pose.inverse_transform_point(&object.into()).coords;
+            if (pose.rotation.inverse() * u).z < -0.2 {
+                points.push([seen.x as f32, seen.y as f32, seen.z as f32]);
+            }
+        }
+    }
+    Scan { points, ..Scan::default() }
+}
+
+fn truth() -> Vec<Pose> {
+    (0..8)
+        .map(|k| {
+            let angle = f64::from(k) * std::f64::consts::FRAC_PI_4;
+            let eye = Vec3::new(0.3 * angle.cos(), 0.3 * angle.sin(), 0.1).into();
+            Pose::face_towards(&eye, &nalgebra::Point3::origin(), &Vec3::z())
+        })
+        .collect()
+}
+
+fn random_twist(rng: &mut ChaCha8Rng, translation: f64, rotation: f64) -> Twist {
+    Twist::from_fn(|i, _| rng.random_range(-1.7..1.7) * if i < 3 { translation } else { rotation })
+}
+
+struct Case {
+    scans: Vec<PreparedScan>,
+    robot: Vec<Pose>,
+    truth: Vec<Pose>,
+}
+
+fn case(sigma: PoseSigma) -> Case {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let truth = truth();
+    let scans = truth
+        .iter()
+        .map(|pose| PreparedScan::new(&scan_of_blob(pose, &mut rng)).unwrap())
+        .collect();
+    let robot = truth
+        .iter()
+        .map(|pose| pose * exp(&random_twist(&mut rng, sigma.translation, sigma.rotation)))
+        .collect();
+    Case { scans, robot, truth }
+}
+
+/// Largest error of the poses relative to their common rigid offset: metres at 50 mm from the origin.
+fn error(poses: &[Pose], truth: &[Pose]) -> f64 {
+    let offset = truth[0] * poses[0].inverse();
+    let far = |xi: Twist| xi.fixed_rows::<3>(0).norm() + 0.05 * xi.fixed_rows::<3>(3).norm();
+    poses
+        .iter()
+        .zip(truth)
+        .map(|(p, t)| far(log(&((offset * p) * t.inverse()))))
+        .fold(0.0, f64::max)
+}
+
+const SIGMA: PoseSigma = PoseSigma { translation: 0.002, rotation: 0.006 };
+
+#[test]
+fn poses_come_back_and_every_scan_is_accepted() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let result =
+        register(&case.scans, &case.robot, Some(SIGMA), &params, &Progress::silent()).unwrap();
+    for verdict in &result.verdicts {
+        assert_eq!(verdict.status, Status::Accepted, "{}", verdict.reason);
+    }
+    let (before, after) = (error(&case.robot, &case.truth), error(&result.poses, &case.truth));
+    assert!(before > 2e-3 && after < 1.5e-4, "{before} {after}");
+    assert!(result.residual < 2e-4, "{}", result.residual);
+}
+
+#[test]
+fn the_sigma_is_estimated_when_the_robot_gives_none() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let result = register(&case.scans, &case.robot, None, &params, &Progress::silent()).unwrap();
+    let ratio = result.pose_sigma.translation / SIGMA.translation;
+    assert!(ratio > 0.3 && ratio < 3.0, "{ratio}");
+    assert!(error(&result.poses, &case.truth) < 2e-4);
+}
+
+#[test]
+fn the_thesis_registers_too_and_less_well() {
+    let case = case(SIGMA);
+    let params =
+        RegisterParams { method: Method::Thesis, radius: 0.003, ..RegisterParams::default() };
+    let result =
+        register(&case.scans, &case.robot, Some(SIGMA), &params, &Progress::silent()).unwrap();
+    let after = error(&result.poses, &case.truth);
+    assert!(after < error(&case.robot, &case.truth), "{after}");
+}
+
+#[test]
+fn a_scan_of_something_else_is_refused_with_the_reason() {
+    let mut case = case(SIGMA);
+    let alien: Vec<[f32; 3]> = (0..4000)
+        .map(|i| {
+            [
+                (i % 63) as f32 * 1e-3 - 0.03,
+                (i / 63) as f32 * 1e-3 - 0.03,
+                0.15 + (i % 63) as f32 * 2e-3,
+            ]
+        })
+        .collect();
+    case.scans[4] = PreparedScan::new(&Scan { points: alien, ..Scan::default() }).unwrap();
+    let params = RegisterParams::default();
+    let result =
+        register(&case.scans, &case.robot, Some(SIGMA), &params, &Progress::silent()).unwrap();
+    assert_eq!(result.verdicts[4].status, Status::Refused);
+    assert!(!result.verdicts[4].reason.is_empty());
+    assert_eq!(result.verdicts.iter().filter(|v| v.status == Status::Accepted).count(), 7);
+    assert_eq!(result.poses[4], case.robot[4]);
+}
+
+#[test]
+fn a_correction_beyond_three_sigma_is_refused() {
+    let mut case = case(PoseSigma { translation: 1e-4, rotation: 3e-4 });
+    let sigma = PoseSigma { translation: 1e-4, rotation: 3e-4 };
+    case.robot[3] *= exp(&Twist::new(0.0, 0.004, 0.0, 0.0, 0.0, 0.0));
+    let params = RegisterParams { radius: 0.01, ..RegisterParams::default() };
+    let result =
+        register(&case.scans, &case.robot, Some(sigma), &params, &Progress::silent()).unwrap();
+    assert_eq!(result.verdicts[3].status, Status::Refused, "{}", result.verdicts[3].reason);
+    assert!(result.verdicts[3].reason.contains("beyond 3"), "{}", result.verdicts[3].reason);
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bits() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            register(&case.scans, &case.robot, Some(SIGMA), &params, &Progress::silent()).unwrap()
+        })
+    };
+    assert_eq!(run(1).poses, run(2).poses);
+}
+
+#[test]
+fn a_cancelled_registration_stops() {
+    let case = case(SIGMA);
+    let progress = Progress::silent();
+    progress.cancel();
+    let outcome =
+        register(&case.scans, &case.robot, Some(SIGMA), &RegisterParams::default(), &progress);
+    assert!(matches!(outcome, Err(Error::Cancelled)));
+}
