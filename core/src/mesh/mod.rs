@@ -14,6 +14,7 @@ pub use invariants::{
     is_two_manifold, min_angles,
 };
 pub use triangle::{triangle_angles, triangles_intersect};
+pub mod isosurface;
 
 use crate::geometry::{Aabb, Pose, Vec3};
 
