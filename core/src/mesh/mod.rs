@@ -1,20 +1,23 @@
 //! Triangle meshes: the plain indexed mesh, and what is known of it.
 
 mod box_tree;
+mod half_edge;
 pub mod intersect;
 pub mod invariants;
 pub mod io;
+pub mod isosurface;
+pub mod remesh;
 #[cfg(test)]
 pub(crate) mod test_shapes;
 mod triangle;
 
+pub use half_edge::HalfEdgeMesh;
 pub use intersect::{self_intersections, self_intersections_among};
 pub use invariants::{
     components, degenerate_triangles, euler_characteristic, genus, is_closed, is_oriented,
     is_two_manifold, min_angles,
 };
 pub use triangle::{triangle_angles, triangles_intersect};
-pub mod isosurface;
 
 use crate::geometry::{Aabb, Pose, Vec3};
 
