@@ -1,0 +1,133 @@
+use super::*;
+use crate::mesh::{
+    components, genus, is_closed, is_oriented, is_two_manifold, self_intersections, test_shapes,
+};
+
+/// Points on the triangles of `shape`, about `spacing` apart, with their normals.
+fn cloud_on(shape: &Mesh, spacing: f64) -> Cloud {
+    let mut shape = shape.clone();
+    shape.compute_normals();
+    let mut cloud = Cloud::default();
+    for (t, triangle) in shape.triangles.iter().enumerate() {
+        let [a, b, c] = shape.corners(t);
+        let [na, nb, nc] = triangle.map(|v| shape.normals[v as usize]);
+        let n = ((b - a).norm().max((c - a).norm()) / spacing).ceil() as usize;
+        for i in 0..n {
+            for j in 0..n - i {
+                let (u, v) = ((i as f64 + 0.33) / n as f64, (j as f64 + 0.33) / n as f64);
+                let w = 1.0 - u - v;
+                cloud.push(a * w + b * u + c * v, (na * w + nb * u + nc * v).normalize(), 1e-4, 3);
+            }
+        }
+    }
+    cloud
+}
+
+fn assert_watertight(mesh: &Mesh, expected_genus: i64) {
+    assert!(is_closed(mesh) && is_two_manifold(mesh) && is_oriented(mesh));
+    assert!(self_intersections(mesh).is_empty());
+    assert_eq!(components(mesh), 1);
+    assert_eq!(genus(mesh), Some(expected_genus));
+    assert!(mesh.volume() > 0.0);
+}
+
+fn run(cloud: &Cloud, params: &ReconstructParams) -> Mesh {
+    reconstruct(cloud, params, &Progress::silent()).unwrap()
+}
+
+#[test]
+fn a_sphere_comes_out_round_and_observed() {
+    let cloud = cloud_on(&test_shapes::sphere(0.05, 4), 0.0015);
+    let mesh = run(&cloud, &ReconstructParams::default());
+    assert_watertight(&mesh, 0);
+    let worst = mesh.vertices.iter().map(|v| (v.norm() - 0.05).abs()).fold(0.0, f64::max);
+    assert!(worst < 1.5e-4, "{worst}");
+    assert!(mesh.observed.iter().all(|o| *o));
+    assert!(mesh.sigma.iter().all(|s| *s > 5e-5 && *s < 3e-4));
+}
+
+#[test]
+fn a_torus_keeps_its_handle() {
+    let cloud = cloud_on(&test_shapes::torus(0.05, 0.018, 80, 40), 0.002);
+    assert_watertight(&run(&cloud, &ReconstructParams::default()), 1);
+}
+
+#[test]
+fn a_hole_in_the_data_is_closed_and_marked() {
+    let whole = cloud_on(&test_shapes::sphere(0.05, 4), 0.0015);
+    let seen: Vec<usize> = (0..whole.len()).filter(|&i| whole.points[i].z > -0.04).collect();
+    let mesh = run(&whole.select(&seen), &ReconstructParams::default());
+    assert_watertight(&mesh, 0);
+    for (v, observed) in mesh.vertices.iter().zip(&mesh.observed) {
+        assert!(!observed || v.z > -0.044, "{v}");
+    }
+    assert!(mesh.observed.iter().any(|o| !o));
+    let lowest = mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::min);
+    assert!(lowest > -0.055, "{lowest}");
+}
+
+#[test]
+fn two_balls_joined_by_a_thin_neck_stay_one() {
+    let field = |p: &Vec3| {
+        let ball =
+            (p - Vec3::new(0.0, 0.0, 0.03)).norm().min((p + Vec3::new(0.0, 0.0, 0.03)).norm())
+                - 0.022;
+        let neck = (p.x.hypot(p.y) - 0.005).max(p.z.abs() - 0.03);
+        ball.min(neck)
+    };
+    let bounds = crate::geometry::Aabb { min: Vec3::repeat(-0.06), max: Vec3::repeat(0.06) };
+    let shape = crate::mesh::isosurface::Lattice::sample(&bounds, 0.0015, field).surface();
+    assert_watertight(&run(&cloud_on(&shape, 0.0015), &ReconstructParams::default()), 0);
+}
+
+#[test]
+fn the_thesis_inflates_and_details_a_sphere() {
+    let cloud = cloud_on(&test_shapes::sphere(0.05, 4), 0.0012);
+    let params = ReconstructParams {
+        inflate: InflateMethod::Thesis,
+        detail: DetailMethod::Thesis,
+        voxel_edge: 0.005,
+        edge_length: 0.003,
+        start_edge: 2.0,
+        iterations: 10,
+        ..ReconstructParams::default()
+    };
+    let mesh = run(&cloud, &params);
+    assert_watertight(&mesh, 0);
+    let rms = (mesh.vertices.iter().map(|v| (v.norm() - 0.05).powi(2)).sum::<f64>()
+        / mesh.vertices.len() as f64)
+        .sqrt();
+    assert!(rms < 1e-3, "{rms}");
+}
+
+#[test]
+fn planes_and_handfuls_are_refused() {
+    let mut plane = Cloud::default();
+    for i in 0..400 {
+        plane.push(Vec3::new(f64::from(i % 20), f64::from(i / 20), 0.0) * 1e-3, Vec3::z(), 1e-4, 1);
+    }
+    let refuse = |cloud: &Cloud| {
+        reconstruct(cloud, &ReconstructParams::default(), &Progress::silent())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(refuse(&plane).contains("plane"));
+    assert!(refuse(&plane.select(&[1, 2, 3])).contains("3 usable points"));
+    assert!(refuse(&Cloud::default()).contains("0 usable points"));
+    let inside_out = {
+        let mut cloud = cloud_on(&test_shapes::sphere(0.05, 3), 0.002);
+        cloud.normals.iter_mut().for_each(|n| *n = -*n);
+        cloud
+    };
+    assert!(refuse(&inside_out).contains("turned inwards"));
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bits() {
+    let cloud = cloud_on(&test_shapes::torus(0.05, 0.018, 60, 30), 0.003);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run(&cloud, &ReconstructParams::default()))
+    };
+    assert_eq!(with(1), with(2));
+}
