@@ -1,6 +1,7 @@
 //! Triangle meshes: the plain indexed mesh, and what is known of it.
 
 pub mod io;
+pub mod render;
 
 use crate::geometry::{Aabb, Pose, Vec3};
 
