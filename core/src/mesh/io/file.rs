@@ -108,6 +108,8 @@ mod tests {
             says(Path::new("/dev/full"), "free some space");
         }
         assert!(names(folder.path()).is_empty());
+        let denied = advise(ErrorKind::PermissionDenied.into()).to_string();
+        assert!(denied.contains("a folder that you may write to"), "{denied}");
     }
 
     #[cfg(unix)]

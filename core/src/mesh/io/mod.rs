@@ -107,6 +107,11 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, comments: &[String]) -> Result<()> {
         Error::format(path, "the extension tells no known format; use .ply, .stl, .obj or .glb")
     })?;
     check_consistent(mesh)?;
+    // A GLB file tells its length in 32 bits; a MiB is more than its header takes.
+    let glb_size = mesh.vertices.len() * 28 + mesh.triangles.len() * 12 + (1 << 20);
+    if matches!(format, Format::Glb) && u32::try_from(glb_size).is_err() {
+        return Err(Error::format(path, "the mesh is too large for GLB (4 GiB); write a PLY"));
+    }
     let mut mesh = std::borrow::Cow::Borrowed(mesh);
     if mesh.normals.is_empty() {
         mesh.to_mut().compute_normals();
