@@ -18,6 +18,7 @@ pub use invariants::{
     is_two_manifold, min_angles,
 };
 pub use triangle::{triangle_angles, triangles_intersect};
+pub mod render;
 
 use crate::geometry::{Aabb, Pose, Vec3};
 

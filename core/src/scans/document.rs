@@ -1,0 +1,160 @@
+//! `poses.json`: what stands in it, and what is made of it.
+
+use super::cloud::Frame;
+use super::{PoseSigma, SensorKind, Unit};
+use crate::geometry::{Pose, pose_from_rows, pose_to_rows};
+use crate::{Error, Result};
+use serde_json::{Value, json};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// The only value of the key `format` that is understood.
+pub(super) const FORMAT: &str = "puffer-scans-1";
+/// Value of the key `cloud_frame` where the clouds are Stanford's range grids.
+pub(super) const RANGE_GRID: &str = "range_grid";
+/// Farthest that a sensor is believed to be from the object frame, metres: poses in millimetres lie beyond.
+const FARTHEST: f64 = 100.0;
+
+/// One view of a document.
+pub(super) struct Entry {
+    pub(super) name: String,
+    /// Path of the cloud as it stands in the document.
+    pub(super) cloud: String,
+    /// Points in a row if the document tells it, else 0.
+    pub(super) width: usize,
+    pub(super) object_from_sensor: Pose,
+}
+
+/// What a document tells, checked.
+pub(super) struct Parsed {
+    pub(super) entries: Vec<Entry>,
+    pub(super) frame: Frame,
+    pub(super) sensor: Option<SensorKind>,
+    pub(super) pose_sigma: Option<PoseSigma>,
+    pub(super) nominal: Value,
+    /// Folder of the clouds, from that of the document; empty for the same.
+    pub(super) clouds_in: String,
+}
+
+/// Reads a document's text as JSON.
+pub(super) fn parse_json(bytes: &[u8], path: &Path) -> Result<Value> {
+    serde_json::from_slice(bytes)
+        .map_err(|e| Error::format(path, format!("is not JSON: {e}; it must be an object")))
+}
+
+/// Checks a document; `path` is where it came from.
+pub(super) fn parse(document: &Value, path: &Path, unit: Unit) -> Result<Parsed> {
+    let fail = |message: String| Error::format(path, message);
+    match &document["format"] {
+        Value::String(format) if format == FORMAT => {}
+        Value::Null => {
+            return Err(fail(format!("lacks the key \"format\"; it must say \"{FORMAT}\"")));
+        }
+        other => return Err(fail(format!("has the format {other}; only \"{FORMAT}\" is read"))),
+    }
+    let views = document["views"].as_array().map_or(&[][..], Vec::as_slice);
+    if views.is_empty() {
+        return Err(fail("has no views: \"views\" must list a cloud and a pose each".into()));
+    }
+    let mut names = HashSet::new();
+    let mut entries = Vec::with_capacity(views.len());
+    for (index, view) in views.iter().enumerate() {
+        let entry = entry(view, unit).map_err(|e| fail(format!("view {index}{e}")))?;
+        if !names.insert(entry.name.clone()) {
+            return Err(fail(format!(
+                "view {index} ({}): an earlier view has this name already; give each its own",
+                entry.cloud
+            )));
+        }
+        entries.push(entry);
+    }
+    Ok(Parsed {
+        entries,
+        frame: frame(document).map_err(fail)?,
+        sensor: sensor(document).map_err(fail)?,
+        pose_sigma: pose_sigma(document, unit).map_err(fail)?,
+        nominal: document["nominal"].clone(),
+        clouds_in: document["clouds_in"].as_str().unwrap_or_default().to_owned(),
+    })
+}
+
+/// The error is the rest of a sentence that starts with the view's number.
+fn entry(view: &Value, unit: Unit) -> std::result::Result<Entry, String> {
+    let cloud = view["cloud"]
+        .as_str()
+        .filter(|cloud| !cloud.is_empty())
+        .ok_or_else(|| String::from(": lacks \"cloud\", the name of its PLY file"))?;
+    let object_from_sensor = pose(&view["object_from_sensor"], unit)
+        .map_err(|message| format!(" ({cloud}): {message}"))?;
+    let width = view["width"].as_u64().and_then(|w| usize::try_from(w).ok()).unwrap_or(0);
+    let name = view_name(cloud);
+    Ok(Entry { name, cloud: cloud.to_owned(), width, object_from_sensor })
+}
+
+/// A cloud's path without the extension.
+pub(super) fn view_name(cloud: &str) -> String {
+    Path::new(cloud).with_extension("").to_string_lossy().into_owned()
+}
+
+fn pose(value: &Value, unit: Unit) -> std::result::Result<Pose, String> {
+    if value.is_null() {
+        return Err("lacks \"object_from_sensor\", its pose as a 4 x 4 matrix".into());
+    }
+    let rows: [[f64; 4]; 4] = serde_json::from_value(value.clone()).map_err(|_| {
+        "\"object_from_sensor\" must be four rows of four numbers (row-major)".to_owned()
+    })?;
+    let mut pose = pose_from_rows(&rows).map_err(|e| format!("\"object_from_sensor\": {e}"))?;
+    pose.translation.vector *= unit.metres();
+    let distance = pose.translation.vector.norm();
+    if distance > FARTHEST {
+        return Err(format!(
+            "its pose lies {distance:.1} m from the object's frame: millimetres? use --unit mm"
+        ));
+    }
+    Ok(pose)
+}
+
+fn frame(document: &Value) -> std::result::Result<Frame, String> {
+    match &document["cloud_frame"] {
+        Value::Null => Ok(Frame::Sensor),
+        Value::String(word) if word == "sensor" => Ok(Frame::Sensor),
+        Value::String(word) if word == RANGE_GRID => Ok(Frame::RangeGrid),
+        other => {
+            Err(format!("has the cloud_frame {other}; known are \"sensor\" and \"{RANGE_GRID}\""))
+        }
+    }
+}
+
+fn sensor(document: &Value) -> std::result::Result<Option<SensorKind>, String> {
+    let value = &document["sensor"];
+    if value.is_null() {
+        return Ok(None);
+    }
+    let kind = value.as_str().and_then(SensorKind::from_word);
+    kind.map(Some).ok_or_else(|| {
+        format!("has the sensor {value}; known are \"laser\" and \"stereo\"; leave it out if neither fits")
+    })
+}
+
+fn pose_sigma(document: &Value, unit: Unit) -> std::result::Result<Option<PoseSigma>, String> {
+    let value = &document["pose_sigma"];
+    if value.is_null() {
+        return Ok(None);
+    }
+    let number = |key: &str| {
+        value[key].as_f64().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(|| {
+            format!("\"pose_sigma\" must have \"{key}\", a number not below 0 (metres, radians)")
+        })
+    };
+    let translation = number("translation")? * unit.metres();
+    Ok(Some(PoseSigma { translation, rotation: number("rotation")? }))
+}
+
+/// A pose as it stands in a document whose lengths are in `unit`.
+pub(super) fn matrix(pose: &Pose, unit: Unit) -> Value {
+    let mut rows = pose_to_rows(pose);
+    for row in rows.iter_mut().take(3) {
+        row[3] /= unit.metres();
+    }
+    json!(rows)
+}

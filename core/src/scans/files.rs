@@ -1,0 +1,169 @@
+//! Opening and reading of scans.
+
+use super::cloud::{Frame, parse_scan};
+use super::document::{self, Entry, Parsed};
+use super::{PoseSigma, ScanSet, SensorKind, Unit, View, conf};
+use crate::geometry::Pose;
+use crate::mesh::io::read_bytes;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const POSES: &str = "poses.json";
+
+/// Scans whose poses are known and whose points are still in their files, for those who take view by view.
+pub struct ScanFiles {
+    source: PathBuf,
+    /// Folder of the clouds.
+    folder: PathBuf,
+    unit: Unit,
+    entries: Vec<Entry>,
+    frame: Frame,
+    /// The noise family, if it is known.
+    pub sensor: Option<SensorKind>,
+    /// How uncertain the poses are, if it is known.
+    pub pose_sigma: Option<PoseSigma>,
+    /// Sensor figures as they stand in the file; null if there are none.
+    pub nominal: Value,
+}
+
+impl ScanFiles {
+    /// Opens a scan folder, its `poses.json`, or a Stanford `*.conf`; the lengths in them (points, poses,
+    /// `pose_sigma`) are in `unit`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be read or a view's cloud is missing, [`Error::Format`] with the view's
+    /// name if something does not fit the format.
+    pub fn open(path: &Path, unit: Unit) -> Result<ScanFiles> {
+        let (document, source) = read_document(path)?;
+        let parsed = document::parse(&document, &source, unit)?;
+        let Parsed { entries, frame, sensor, pose_sigma, nominal, clouds_in } = parsed;
+        let folder = source.with_file_name("").join(clouds_in);
+        let files = ScanFiles { source, folder, unit, entries, frame, sensor, pose_sigma, nominal };
+        for (index, entry) in files.entries.iter().enumerate() {
+            let cloud = files.cloud_path(index);
+            if !cloud.is_file() {
+                let message = format!(
+                    "view {index} ({}): its cloud {} is missing; put it there or take the view out",
+                    entry.name,
+                    cloud.display()
+                );
+                return Err(Error::format(&files.source, message));
+            }
+        }
+        Ok(files)
+    }
+
+    /// Number of views.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there is no view; never so after [`ScanFiles::open`].
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Name of view `index`.
+    pub fn name(&self, index: usize) -> &str {
+        &self.entries[index].name
+    }
+
+    /// The pose object_from_sensor of view `index`, metres.
+    pub fn pose(&self, index: usize) -> Pose {
+        self.entries[index].object_from_sensor
+    }
+
+    /// Reads view `index`, in metres.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Format`] if its cloud cannot be read, is malformed, holds no finite point, or
+    /// seems to be in another unit.
+    pub fn view(&self, index: usize) -> Result<View> {
+        let entry = &self.entries[index];
+        let path = self.cloud_path(index);
+        let scan = parse_scan(&read_bytes(&path)?, &path, self.frame, self.unit, entry.width)
+            .map_err(|error| match error {
+                Error::Format { path, message } => {
+                    Error::Format { path, message: format!("view {}: {message}", entry.name) }
+                }
+                other => other,
+            })?;
+        let object_from_sensor = entry.object_from_sensor;
+        Ok(View { name: entry.name.clone(), scan, object_from_sensor })
+    }
+
+    /// The file that holds the poses.
+    pub fn source(&self) -> &Path {
+        &self.source
+    }
+
+    fn cloud_path(&self, index: usize) -> PathBuf {
+        self.folder.join(&self.entries[index].cloud)
+    }
+}
+
+/// Reads all scans of a scan folder, its `poses.json`, or a Stanford `*.conf`; the lengths in them are in `unit`,
+/// those of the result in metres. Range grids are turned into our sensor frame, with parallel rays.
+///
+/// # Errors
+/// As [`ScanFiles::open`] and [`ScanFiles::view`].
+pub fn read_scans(path: &Path, unit: Unit) -> Result<ScanSet> {
+    let files = ScanFiles::open(path, unit)?;
+    let views = (0..files.len()).into_par_iter().map(|i| files.view(i));
+    // Collected whole first: the error told is that of the first view, whatever thread was faster.
+    let views: Vec<Result<View>> = views.collect();
+    Ok(ScanSet {
+        views: views.into_iter().collect::<Result<_>>()?,
+        sensor: files.sensor,
+        pose_sigma: files.pose_sigma,
+        nominal: files.nominal,
+    })
+}
+
+/// The document of an input, and the file that it came from.
+pub(super) fn read_document(path: &Path) -> Result<(Value, PathBuf)> {
+    let source = find_source(path)?;
+    let extension = source.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let document = match extension.to_ascii_lowercase().as_str() {
+        "json" => document::parse_json(&read_bytes(&source)?, &source)?,
+        "conf" => conf::to_document(&read_bytes(&source)?, &source)?,
+        "ply" => {
+            return Err(Error::format(
+                &source,
+                "is a single PLY, not scans with poses: give a scan folder (poses.json and one PLY a view)",
+            ));
+        }
+        _ => {
+            return Err(Error::format(
+                &source,
+                "holds no scans: give a scan folder, its poses.json, or a Stanford .conf",
+            ));
+        }
+    };
+    Ok((document, source))
+}
+
+/// The file with the poses: `path` itself, or in the folder `path` poses.json or else the only `.conf`.
+fn find_source(path: &Path) -> Result<PathBuf> {
+    if !path.is_dir() {
+        return Ok(path.to_path_buf());
+    }
+    let poses = path.join(POSES);
+    if poses.is_file() {
+        return Ok(poses);
+    }
+    let entries = std::fs::read_dir(path).map_err(|e| Error::io("read", path, e))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "conf"));
+    match files.as_slice() {
+        [conf] => Ok(conf.clone()),
+        _ => Err(Error::format(
+            path,
+            format!(
+                "has no {POSES}: a scan folder needs it, with a cloud and a pose for each view"
+            ),
+        )),
+    }
+}

@@ -1,0 +1,146 @@
+//! Writing of scan folders and of corrected poses.
+
+use super::document::{FORMAT, matrix};
+use super::files::read_document;
+use super::{ScanSet, Unit, View, cloud};
+use crate::geometry::{Pose, Scan};
+use crate::mesh::io::write_bytes;
+use crate::{Error, Result};
+use serde_json::{Map, Value, json};
+use std::path::{Component, Path, PathBuf};
+
+/// Writes a scan folder in metres, which is created if need be: one binary PLY a view, then `poses.json`.
+/// `extras[i]`, an object, is added to view `i` (a verdict, for instance); `extras` may be empty.
+///
+/// # Errors
+/// [`Error::Input`] if `extras` has another length than the views, two views would share a file, or a scan's
+/// vectors do not fit each other,
+/// [`Error::Io`] if something cannot be written.
+pub fn write_scans(dir: &Path, set: &ScanSet, extras: &[Value]) -> Result<()> {
+    check_extras(extras, set.views.len())?;
+    std::fs::create_dir_all(dir).map_err(|e| Error::io("create", dir, e))?;
+    let mut views: Vec<Value> = Vec::with_capacity(set.views.len());
+    for view in &set.views {
+        let file = file_name(&view.name);
+        check_scan(view)?;
+        if views.iter().any(|other| other["cloud"] == *file) {
+            return Err(Error::input(format!("two views would be written to {file}: rename one")));
+        }
+        write_bytes(&dir.join(&file), &cloud::encode_scan(&view.scan))?;
+        let matrix = matrix(&view.object_from_sensor, Unit::M);
+        views.push(json!({"cloud": file, "object_from_sensor": matrix}));
+    }
+    let mut document = Map::new();
+    document.insert("format".into(), FORMAT.into());
+    if let Some(sensor) = set.sensor {
+        document.insert("sensor".into(), sensor.word().into());
+    }
+    if !set.nominal.is_null() {
+        document.insert("nominal".into(), set.nominal.clone());
+    }
+    if let Some(sigma) = set.pose_sigma {
+        let value = json!({"translation": sigma.translation, "rotation": sigma.rotation});
+        document.insert("pose_sigma".into(), value);
+    }
+    for (view, extra) in views.iter_mut().zip(extras) {
+        add(view, extra);
+    }
+    document.insert("views".into(), views.into());
+    write_json(&dir.join("poses.json"), &document.into())
+}
+
+/// Writes the poses file of the scans at `source` (as [`super::read_scans`] takes it) anew to `path`, with `poses` in
+/// place of its own and `extras[i]`, an object, added to view `i`; `extras` may be empty. All other keys are
+/// kept. `unit` is that of the source's lengths, and stays that of the file.
+///
+/// In another folder than the source's, the key `clouds_in` tells where the clouds are.
+///
+/// # Errors
+/// As [`super::ScanFiles::open`]; [`Error::Input`] if the counts differ; [`Error::Io`] if it cannot be written.
+pub fn write_poses(
+    path: &Path,
+    source: &Path,
+    unit: Unit,
+    poses: &[Pose],
+    extras: &[Value],
+) -> Result<()> {
+    let (mut document, source) = read_document(source)?;
+    let views = document.get_mut("views").and_then(Value::as_array_mut);
+    let views = views.map_or(&mut [][..], Vec::as_mut_slice);
+    if views.len() != poses.len() {
+        return Err(Error::input(format!(
+            "{} has {} views, but {} poses are to be written",
+            source.display(),
+            views.len(),
+            poses.len()
+        )));
+    }
+    check_extras(extras, poses.len())?;
+    for (view, pose) in views.iter_mut().zip(poses) {
+        add(view, &json!({"object_from_sensor": matrix(pose, unit)}));
+    }
+    for (view, extra) in views.iter_mut().zip(extras) {
+        add(view, extra);
+    }
+    let clouds = source.with_file_name("").join(document["clouds_in"].as_str().unwrap_or_default());
+    if let Some(object) = document.as_object_mut() {
+        object.remove("clouds_in");
+        if let Some(folder) = way(&path.with_file_name(""), &clouds) {
+            object.insert("clouds_in".into(), folder.to_string_lossy().into());
+        }
+    }
+    write_json(path, &document)
+}
+
+fn check_scan(view: &View) -> Result<()> {
+    let Scan { points, width, origins } = &view.scan;
+    let rows_are_full = *width == 0 || points.len().is_multiple_of(*width);
+    if rows_are_full && (origins.is_empty() || origins.len() == points.len()) {
+        return Ok(());
+    }
+    Err(Error::input(format!(
+        "view {}: {} points do not fit {} origins and rows of {width}",
+        view.name,
+        points.len(),
+        origins.len()
+    )))
+}
+
+fn check_extras(extras: &[Value], views: usize) -> Result<()> {
+    if extras.is_empty() || extras.len() == views {
+        return Ok(());
+    }
+    Err(Error::input(format!("{} extras do not fit {views} views", extras.len())))
+}
+
+/// Puts the keys of the object `extra` into the object `view`.
+fn add(view: &mut Value, extra: &Value) {
+    if let (Some(view), Some(extra)) = (view.as_object_mut(), extra.as_object()) {
+        view.extend(extra.iter().map(|(key, value)| (key.clone(), value.clone())));
+    }
+}
+
+fn write_json(path: &Path, document: &Value) -> Result<()> {
+    // Pretty, with its matrices over many lines, it is still the file that a person will look at.
+    write_bytes(path, format!("{document:#}\n").as_bytes())
+}
+
+/// A file's name made of a view's, without what a path or a file system could take amiss.
+fn file_name(view: &str) -> String {
+    let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+    let name: String = view.chars().map(harmless).collect();
+    format!("{}.ply", if name.is_empty() { "view" } else { &name })
+}
+
+/// The relative path that leads from one folder to another; `None` if they are the same.
+fn way(from: &Path, to: &Path) -> Option<PathBuf> {
+    let here =
+        |path: &Path| if path.as_os_str().is_empty() { ".".into() } else { path.to_path_buf() };
+    let (from, to) = (here(from), here(to));
+    let (Ok(from), Ok(to)) = (from.canonicalize(), to.canonicalize()) else { return Some(to) };
+    let (from, to): (Vec<_>, Vec<_>) = (from.components().collect(), to.components().collect());
+    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let up = from[shared..].iter().map(|_| Component::ParentDir);
+    let relative: PathBuf = up.chain(to[shared..].iter().copied()).collect();
+    (!relative.as_os_str().is_empty()).then_some(relative)
+}
