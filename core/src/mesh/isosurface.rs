@@ -214,10 +214,8 @@ fn cut(
         order[inside] = i;
         inside += 1;
     }
-    let mut end = inside;
-    for i in (0..4).filter(|&i| signs >> corners[i] & 1 == 0) {
+    for (end, i) in (inside..).zip((0..4).filter(|&i| signs >> corners[i] & 1 == 0)) {
         order[end] = i;
-        end += 1;
     }
     // Inside corners first: reordering by an odd permutation turns the tetrahedron's orientation over.
     let inversions =

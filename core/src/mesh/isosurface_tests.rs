@@ -118,7 +118,7 @@ fn noise_gives_a_closed_manifold() {
 }
 
 /// Whether the segment from `p` to `q` goes through the triangle.
-fn pierces(p: &Vec3, q: &Vec3, [a, b, c]: &[Vec3; 3]) -> bool {
+pub(crate) fn pierces(p: &Vec3, q: &Vec3, [a, b, c]: &[Vec3; 3]) -> bool {
     let volume = |a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3| (b - a).cross(&(c - a)).dot(&(d - a));
     let sides = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
     let across = volume(a, b, c, p) * volume(a, b, c, q) < -1e-14;

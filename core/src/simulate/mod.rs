@@ -1,1 +1,3 @@
 //! Simulated objects, sensors and robots.
+
+pub mod objects;
