@@ -18,6 +18,8 @@ pub mod filter;
 
 pub mod reconstruct;
 
+pub mod pipeline;
+
 pub mod simulate;
 
 pub mod assess;

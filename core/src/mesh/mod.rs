@@ -7,6 +7,7 @@ pub mod invariants;
 pub mod io;
 pub mod isosurface;
 pub mod remesh;
+pub mod render;
 #[cfg(test)]
 pub(crate) mod test_shapes;
 mod triangle;
@@ -18,7 +19,6 @@ pub use invariants::{
     is_two_manifold, min_angles,
 };
 pub use triangle::{triangle_angles, triangles_intersect};
-pub mod render;
 
 use crate::geometry::{Aabb, Pose, Vec3};
 

@@ -10,7 +10,7 @@ const ROUNDS: usize = 6;
 /// were, and then their neighbours', until nothing cuts; a mesh free of self-intersections stays so.
 /// Returns the number of vertices that were held back.
 pub(super) fn move_guarded(mesh: &mut HalfEdgeMesh, targets: &[Vec3]) -> usize {
-    let before = std::mem::replace(&mut mesh.positions, targets.to_vec());
+    let before = std::mem::replace(&mut mesh.positions, targets.iter().map(stored).collect());
     let mut snapshot = mesh.snapshot();
     let mut cut = self_intersections(&snapshot);
     let mut held = vec![false; before.len()];
@@ -34,6 +34,11 @@ pub(super) fn move_guarded(mesh: &mut HalfEdgeMesh, targets: &[Vec3]) -> usize {
         return targets.len();
     }
     held.iter().filter(|h| **h).count()
+}
+
+/// The position as a mesh file keeps it, in single precision: what is checked here must hold for what is read.
+pub(super) fn stored(position: &Vec3) -> Vec3 {
+    position.map(|v| f64::from(v as f32))
 }
 
 /// Vertices of the triangles in `pairs`, ascending.
@@ -71,6 +76,7 @@ pub(super) fn edit_guarded(
         let mut edited = mesh.clone();
         // Vertices that a split adds are younger than the list: free.
         edit(&mut edited, &|v| frozen.get(v as usize).copied().unwrap_or(false));
+        edited.positions.iter_mut().for_each(|p| *p = stored(p));
         let snapshot = edited.snapshot();
         let cut = self_intersections(&snapshot);
         if cut.is_empty() {

@@ -15,10 +15,10 @@ mod verdict;
 
 pub use prepare::PreparedScan;
 pub(crate) use prepare::median;
-pub use sigma::PoseSigma;
 pub use verdict::{Status, Verdict};
 
 use crate::geometry::Pose;
+use crate::scans::PoseSigma;
 use crate::{Error, Progress, Result};
 
 crate::choice! {
@@ -72,6 +72,19 @@ pub struct Registration {
     pub pose_sigma: PoseSigma,
     /// Root mean square point-to-plane distance between overlapping scans, metres; NaN with one scan.
     pub residual: f64,
+}
+
+impl Registration {
+    /// The registration of scans whose poses `object_from_sensor` are known exactly.
+    pub fn exact(poses: &[Pose]) -> Registration {
+        let pose_sigma = PoseSigma { translation: 0.0, rotation: 0.0 };
+        let verdict = Verdict {
+            reason: "pose given as exact".into(),
+            ..Verdict::first(&pose_sigma.information())
+        };
+        let verdicts = vec![Verdict { free_directions: Vec::new(), ..verdict }; poses.len()];
+        Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN }
+    }
 }
 
 /// Registers `scans` (sensor frame), starting from the robot's poses `object_from_sensor`.

@@ -3,15 +3,7 @@
 use super::joint::Sample;
 use super::median;
 use crate::geometry::{Mat6, Pose};
-
-/// Standard deviation of a pose per axis, of xi in `T_true = T exp(xi)` (sensor frame).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseSigma {
-    /// Metres.
-    pub translation: f64,
-    /// Radians.
-    pub rotation: f64,
-}
+use crate::scans::PoseSigma;
 
 /// No robot is better than this; it also keeps the information finite for poses called exact.
 const BEST_TRANSLATION: f64 = 1e-6;

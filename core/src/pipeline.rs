@@ -1,0 +1,247 @@
+//! The whole way from scans to a mesh, without ROS: prepare, register, filter, reconstruct.
+
+use crate::filter::{FilterParams, Filtered, filter};
+use crate::geometry::{Cloud, Pose};
+use crate::mesh::Mesh;
+use crate::mesh::io::{Unit, read_cloud_in};
+use crate::params::ParamSpec;
+use crate::reconstruct::{ReconstructParams, reconstruct};
+use crate::register::{PreparedScan, RegisterParams, Registration, Status, register};
+use crate::scans::{PoseSigma, ScanFiles};
+use crate::{Error, Progress, Result};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// Parameters of all stages.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Params {
+    /// Of the registration.
+    pub register: RegisterParams,
+    /// Of the filter.
+    pub filter: FilterParams,
+    /// Of the reconstruction.
+    pub reconstruct: ReconstructParams,
+}
+
+impl Params {
+    /// What is known of each parameter, stage by stage.
+    pub fn specs() -> Vec<ParamSpec> {
+        [RegisterParams::specs(), FilterParams::specs(), ReconstructParams::specs()].concat()
+    }
+
+    /// Sets the parameters that `document`, a map of groups to maps of fields, names.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an unknown group or field, a wrong type or a value out of range.
+    pub fn set_all(&mut self, document: &Value) -> Result<()> {
+        let map = |value: &Value, name: &str| {
+            value.as_object().cloned().ok_or_else(|| Error::Parameter {
+                name: name.to_owned(),
+                message: format!("is {value}; expected a map such as `{name}: {{field: value}}`"),
+            })
+        };
+        for (group, fields) in map(document, "parameters")? {
+            for (field, value) in map(&fields, &group)? {
+                self.set(&group, &field, &value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets one parameter.
+    ///
+    /// # Errors
+    /// As [`Params::set_all`].
+    pub fn set(&mut self, group: &str, field: &str, value: &Value) -> Result<()> {
+        match group {
+            RegisterParams::GROUP => self.register.set(field, value),
+            FilterParams::GROUP => self.filter.set(field, value),
+            ReconstructParams::GROUP => self.reconstruct.set(field, value),
+            _ => Err(Error::Parameter {
+                name: format!("{group}.{field}"),
+                message: format!(
+                    "there is no group {group}; the groups are {}, {} and {}",
+                    RegisterParams::GROUP,
+                    FilterParams::GROUP,
+                    ReconstructParams::GROUP
+                ),
+            }),
+        }
+    }
+}
+
+/// What a mesh can be made of.
+pub enum Input {
+    /// Scans with the robot's poses.
+    Scans(ScanFiles),
+    /// One cloud of registered points with normals.
+    Cloud(Cloud),
+}
+
+impl Input {
+    /// Opens a scan folder, a Stanford `.conf`, or a single PLY with normals.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Format`] or [`Error::Input`] with what is wrong and what to do.
+    pub fn open(path: &Path, unit: Unit) -> Result<Input> {
+        let is_ply = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
+        if is_ply && path.is_file() {
+            return Ok(Input::Cloud(read_cloud_in(path, unit)?));
+        }
+        Ok(Input::Scans(ScanFiles::open(path, unit)?))
+    }
+}
+
+/// How the poses of the input are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Poses {
+    /// As a robot reports them: the scans are registered.
+    Robot,
+    /// As exact: the scans are not registered.
+    Exact,
+}
+
+/// Scans made ready: oriented points, poses, and the hash of all that went in.
+pub struct Prepared {
+    /// Oriented points of each scan, sensor frame.
+    pub scans: Vec<PreparedScan>,
+    /// Name of each scan.
+    pub names: Vec<String>,
+    /// The robot's `object_from_sensor` of each scan.
+    pub robot: Vec<Pose>,
+    /// Standard deviation of those poses, if known.
+    pub pose_sigma: Option<PoseSigma>,
+    /// SHA-256 of the points and poses, in hexadecimal.
+    pub hash: String,
+}
+
+/// Reads all scans and estimates their normals.
+///
+/// # Errors
+/// As [`ScanFiles::view`], and [`Error::Input`] naming the view that cannot be used; [`Error::Cancelled`].
+pub fn prepare(files: &ScanFiles, progress: &Progress) -> Result<Prepared> {
+    let mut prepared = Prepared {
+        scans: Vec::new(),
+        names: Vec::new(),
+        robot: Vec::new(),
+        pose_sigma: files.pose_sigma,
+        hash: String::new(),
+    };
+    let mut hash = Sha256::new();
+    for index in 0..files.len() {
+        progress.report("read", index as f64 / files.len() as f64)?;
+        let view = files.view(index)?;
+        for value in view.scan.points.iter().chain(&view.scan.origins).flatten() {
+            hash.update(value.to_le_bytes());
+        }
+        for value in view.object_from_sensor.to_homogeneous().iter() {
+            hash.update(value.to_le_bytes());
+        }
+        let scan = PreparedScan::new(&view.scan)
+            .map_err(|error| Error::input(format!("view {}: {error}", view.name)))?;
+        prepared.scans.push(scan);
+        prepared.names.push(view.name);
+        prepared.robot.push(view.object_from_sensor);
+    }
+    prepared.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    progress.report("read", 1.0)?;
+    Ok(prepared)
+}
+
+/// Registers the scans, unless their poses are exact.
+///
+/// # Errors
+/// As [`register`].
+pub fn register_scans(
+    prepared: &Prepared,
+    poses: Poses,
+    params: &RegisterParams,
+    progress: &Progress,
+) -> Result<Registration> {
+    match poses {
+        Poses::Robot => {
+            register(&prepared.scans, &prepared.robot, prepared.pose_sigma, params, progress)
+        }
+        Poses::Exact => Ok(Registration::exact(&prepared.robot)),
+    }
+}
+
+/// Combines the accepted scans.
+///
+/// # Errors
+/// As [`filter`].
+pub fn filter_scans(
+    prepared: &Prepared,
+    registration: &Registration,
+    params: &FilterParams,
+    progress: &Progress,
+) -> Result<Filtered> {
+    let accepted = |i: &usize| registration.verdicts[*i].status == Status::Accepted;
+    let scans: Vec<(&PreparedScan, Pose)> = (0..prepared.scans.len())
+        .filter(accepted)
+        .map(|i| (&prepared.scans[i], registration.poses[i]))
+        .collect();
+    filter(&scans, registration.residual, params, progress)
+}
+
+/// SHA-256 of a cloud's points and normals, in hexadecimal.
+pub fn cloud_hash(cloud: &Cloud) -> String {
+    let mut hash = Sha256::new();
+    for value in cloud.points.iter().chain(&cloud.normals).flat_map(|v| v.iter()) {
+        hash.update(value.to_le_bytes());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// What the whole way gives.
+pub struct Outcome {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// The cloud that it was made of.
+    pub cloud: Cloud,
+    /// Measurements that went into the cloud.
+    pub measurements: usize,
+    /// The registration; `None` for a single cloud.
+    pub registration: Option<Registration>,
+    /// Names of the views, empty for a single cloud.
+    pub names: Vec<String>,
+    /// SHA-256 of the data that went in.
+    pub hash: String,
+}
+
+/// From input to mesh.
+///
+/// # Errors
+/// Those of the stages.
+pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) -> Result<Outcome> {
+    let files = match input {
+        Input::Cloud(cloud) => {
+            let mesh = reconstruct(cloud, &params.reconstruct, progress)?;
+            let hash = cloud_hash(cloud);
+            let (cloud, measurements) = (cloud.clone(), cloud.len());
+            return Ok(Outcome {
+                mesh,
+                cloud,
+                measurements,
+                registration: None,
+                names: Vec::new(),
+                hash,
+            });
+        }
+        Input::Scans(files) => files,
+    };
+    let prepared = prepare(files, progress)?;
+    let registration = register_scans(&prepared, poses, &params.register, progress)?;
+    let filtered = filter_scans(&prepared, &registration, &params.filter, progress)?;
+    let Prepared { names, hash, .. } = prepared;
+    let mesh = reconstruct(&filtered.cloud, &params.reconstruct, progress)?;
+    Ok(Outcome {
+        mesh,
+        cloud: filtered.cloud,
+        measurements: filtered.measurements,
+        registration: Some(registration),
+        names,
+        hash,
+    })
+}

@@ -1,0 +1,65 @@
+//! `puffer filter`: one cloud with uncertainty.
+
+use super::input::{InputArgs, check_output};
+use crate::parameters::ParameterArgs;
+use crate::progress::Watch;
+use crate::table::Report;
+use anyhow::Result;
+use clap::Args;
+use puffer_core::mesh::io::write_cloud;
+use puffer_core::pipeline::{Input, filter_scans, prepare, register_scans};
+use puffer_core::register::PreparedScan;
+use puffer_core::{filter, geometry};
+use std::path::PathBuf;
+
+/// Combines redundant measurements and drops outliers.
+#[derive(Args)]
+pub struct Filter {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Cloud to write, .ply
+    #[arg(short, long, value_name = "CLOUD")]
+    output: PathBuf,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+impl Filter {
+    pub(super) fn run(&self) -> Result<()> {
+        let params = self.parameters.load()?;
+        check_output(&self.output, &["ply"])?;
+        let input = self.input.open()?;
+        let watch = Watch::start();
+        let filtered = match &input {
+            Input::Scans(files) => {
+                let prepared = prepare(files, watch.progress())?;
+                let registration =
+                    register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
+                filter_scans(&prepared, &registration, &params.filter, watch.progress())?
+            }
+            Input::Cloud(cloud) => {
+                let scan = PreparedScan::of_cloud(cloud)?;
+                let scans = [(&scan, geometry::Pose::identity())];
+                filter::filter(&scans, f64::NAN, &params.filter, watch.progress())?
+            }
+        };
+        watch.finish();
+        write_cloud(&self.output, &filtered.cloud, &[format!("puffer {}", env!("CARGO_PKG_VERSION"))])?;
+        let mut report = Report::default();
+        let points = filtered.cloud.len();
+        report.add("points", format!("{points} of {}", filtered.measurements), "points", points);
+        report.add_value("measurements", filtered.measurements);
+        for (label, key, value) in [
+            ("noise radius", "noise_radius_mm", filtered.noise_radius),
+            ("reduction radius", "reduction_radius_mm", filtered.reduction_radius),
+        ] {
+            report.add(label, format!("{:.3} mm", value * 1e3), key, value * 1e3);
+        }
+        report.add("written", self.output.display().to_string(), "cloud", self.output.display().to_string());
+        report.print(self.json);
+        Ok(())
+    }
+}

@@ -1,0 +1,58 @@
+//! The commands of `puffer`.
+
+mod doctor;
+mod evaluate;
+mod filter;
+mod input;
+mod objects;
+mod params;
+mod reconstruct;
+mod register;
+mod render;
+mod simulate;
+
+use anyhow::Result;
+use clap::Subcommand;
+
+/// What to do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Make a watertight mesh from scans
+    Reconstruct(reconstruct::Reconstruct),
+    /// Correct the poses of scans
+    Register(register::Register),
+    /// Combine scans to one cloud with uncertainty
+    Filter(filter::Filter),
+    /// Scan an object with a simulated robot and sensor
+    Simulate(simulate::Simulate),
+    /// Measure a mesh against the truth
+    Evaluate(evaluate::Evaluate),
+    /// Draw a mesh
+    Render(render::Render),
+    /// List the objects that can be simulated
+    Objects(objects::Objects),
+    /// List the parameters with their defaults, ranges and units
+    Params(params::Params),
+    /// Check this machine
+    Doctor(doctor::Doctor),
+}
+
+impl Command {
+    /// Carries the command out.
+    ///
+    /// # Errors
+    /// Whatever stopped it, in words for the user.
+    pub fn run(&self) -> Result<()> {
+        match self {
+            Command::Reconstruct(command) => command.run(),
+            Command::Register(command) => command.run(),
+            Command::Filter(command) => command.run(),
+            Command::Simulate(command) => command.run(),
+            Command::Evaluate(command) => command.run(),
+            Command::Render(command) => command.run(),
+            Command::Objects(command) => command.run(),
+            Command::Params(command) => command.run(),
+            Command::Doctor(command) => command.run(),
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! `puffer reconstruct`: from scans to a watertight mesh.
+
+use super::input::{InputArgs, check_output};
+use crate::parameters::ParameterArgs;
+use crate::progress::Watch;
+use crate::table::Report;
+use anyhow::Result;
+use clap::Args;
+use puffer_core::mesh::io::write_mesh;
+use puffer_core::mesh::{Mesh, components, genus, is_closed, is_oriented, is_two_manifold};
+use puffer_core::pipeline::{Outcome, run};
+use puffer_core::register::Status;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Registers, filters, inflates and details; every parameter is taken from the data unless given.
+#[derive(Args)]
+pub struct Reconstruct {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Mesh to write: .ply (with uncertainty), .stl, .obj or .glb
+    #[arg(short, long, value_name = "MESH")]
+    output: PathBuf,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+    /// Seed for whatever is left to chance
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+impl Reconstruct {
+    pub(super) fn run(&self) -> Result<()> {
+        let params = self.parameters.load()?;
+        check_output(&self.output, &["ply", "stl", "obj", "glb"])?;
+        let input = self.input.open()?;
+        let watch = Watch::start();
+        let outcome = run(&input, self.input.poses(), &params, watch.progress())?;
+        let times = watch.finish();
+        let comments = [
+            format!("puffer {}", env!("CARGO_PKG_VERSION")),
+            format!("seed {}", self.seed),
+            format!("input sha256 {}", outcome.hash),
+        ];
+        write_mesh(&self.output, &outcome.mesh, &comments)?;
+        self.report(&outcome, &times).print(self.json);
+        Ok(())
+    }
+
+    fn report(&self, outcome: &Outcome, times: &[(String, Duration)]) -> Report {
+        let mut report = Report::default();
+        registration_rows(&mut report, outcome);
+        let points = outcome.cloud.len();
+        let text = format!("{points} points from {} measurements", outcome.measurements);
+        report.add("filtered", text, "filtered_points", points);
+        report.add_value("measurements", outcome.measurements);
+        mesh_rows(&mut report, &outcome.mesh);
+        let mut total = 0.0;
+        let mut parts = Vec::new();
+        let mut json = serde_json::Map::new();
+        for (stage, time) in times {
+            total += time.as_secs_f64();
+            parts.push(format!("{stage} {:.1} s", time.as_secs_f64()));
+            json.insert(stage.clone(), time.as_secs_f64().into());
+        }
+        report.add("time", format!("{total:.1} s ({})", parts.join(", ")), "seconds", total);
+        report.add_value("stage_seconds", json);
+        if let Some(peak) = peak_memory() {
+            report.add("peak memory", format!("{:.2} GB", peak / 1e9), "peak_memory_bytes", peak);
+        }
+        report.add("written", self.output.display().to_string(), "mesh", self.output.display().to_string());
+        report
+    }
+}
+
+fn registration_rows(report: &mut Report, outcome: &Outcome) {
+    let Some(registration) = &outcome.registration else { return };
+    let total = registration.verdicts.len();
+    let accepted = registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
+    report.add("scans", format!("{accepted} of {total} accepted"), "accepted_scans", accepted);
+    report.add_value("scans", total);
+    for (name, verdict) in outcome.names.iter().zip(&registration.verdicts) {
+        if verdict.status != Status::Accepted {
+            eprintln!("puffer: {name} {}: {}", verdict.status.word(), verdict.reason);
+        }
+    }
+    if registration.residual.is_finite() {
+        let millimetres = registration.residual * 1e3;
+        let text = format!("{millimetres:.3} mm between overlapping scans");
+        report.add("registration", text, "registration_residual_mm", millimetres);
+    }
+}
+
+fn mesh_rows(report: &mut Report, mesh: &Mesh) {
+    let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+    report.add("mesh", format!("{vertices} vertices, {triangles} triangles"), "vertices", vertices);
+    report.add_value("triangles", triangles);
+    let (closed, manifold, oriented) = (is_closed(mesh), is_two_manifold(mesh), is_oriented(mesh));
+    let genus = genus(mesh);
+    let text = format!(
+        "closed {}, two-manifold {}, oriented {}, genus {}, components {}",
+        yes(closed),
+        yes(manifold),
+        yes(oriented),
+        genus.map_or_else(|| "undefined".to_owned(), |g| g.to_string()),
+        components(mesh)
+    );
+    report.add("topology", text, "closed", closed);
+    report.add_value("two_manifold", manifold);
+    report.add_value("oriented", oriented);
+    report.add_value("genus", genus);
+    report.add_value("components", components(mesh));
+    let measured: Vec<f64> = mesh.sigma.iter().copied().filter(|s| s.is_finite()).collect();
+    let mean = measured.iter().sum::<f64>() / measured.len().max(1) as f64 * 1e3;
+    let unobserved = 1.0 - measured.len() as f64 / vertices.max(1) as f64;
+    let text = format!("mean {mean:.3} mm; {:.1} % of the vertices not observed", unobserved * 100.0);
+    report.add("uncertainty", text, "mean_sigma_mm", mean);
+    report.add_value("unobserved_share", unobserved);
+}
+
+fn yes(value: bool) -> &'static str {
+    if value { "yes" } else { "NO" }
+}
+
+/// Largest resident size of this process so far, bytes; known on Linux only.
+fn peak_memory() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes * 1024.0)
+}

@@ -1,0 +1,82 @@
+//! `puffer register`: corrected poses and a verdict on each scan.
+
+use super::input::{InputArgs, check_output};
+use crate::parameters::ParameterArgs;
+use crate::progress::Watch;
+use crate::table::Report;
+use anyhow::Result;
+use clap::Args;
+use puffer_core::geometry::log;
+use puffer_core::pipeline::{prepare, register_scans};
+use puffer_core::register::{Status, Verdict};
+use puffer_core::scans::write_poses;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Aligns the scans to each other, the robot's poses being the prior.
+#[derive(Args)]
+pub struct Register {
+    #[command(flatten)]
+    input: InputArgs,
+    /// Corrected poses.json to write
+    #[arg(short, long, value_name = "POSES")]
+    output: PathBuf,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+impl Register {
+    pub(super) fn run(&self) -> Result<()> {
+        let params = self.parameters.load()?;
+        check_output(&self.output, &["json"])?;
+        let files = self.input.open_scans()?;
+        let watch = Watch::start();
+        let prepared = prepare(&files, watch.progress())?;
+        let registration = register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
+        let times = watch.finish();
+        let extras: Vec<Value> =
+            registration.verdicts.iter().map(|v| json!({ "verdict": verdict_json(v) })).collect();
+        write_poses(&self.output, files.source(), self.input.unit(), &registration.poses, &extras)?;
+        let mut report = Report::default();
+        for (i, verdict) in registration.verdicts.iter().enumerate() {
+            let xi = log(&(prepared.robot[i].inverse() * registration.poses[i]));
+            let text = format!(
+                "{:<8}  moved {:6.2} mm, {:5.2} degrees  overlap {:3.0} %  {}",
+                verdict.status.word(),
+                xi.fixed_rows::<3>(0).norm() * 1e3,
+                xi.fixed_rows::<3>(3).norm().to_degrees(),
+                verdict.overlap * 100.0,
+                verdict.reason
+            );
+            report.add(&prepared.names[i], text, &prepared.names[i], verdict.status.word());
+        }
+        let accepted = registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
+        report.add("accepted", format!("{accepted} of {}", files.len()), "accepted_scans", accepted);
+        let residual = registration.residual * 1e3;
+        report.add("residual", format!("{residual:.3} mm between overlapping scans"), "residual_mm", residual);
+        let seconds: f64 = times.iter().map(|(_, time)| time.as_secs_f64()).sum();
+        report.add("time", format!("{seconds:.1} s"), "seconds", seconds);
+        report.print(self.json);
+        Ok(())
+    }
+}
+
+fn verdict_json(verdict: &Verdict) -> Value {
+    let rows: Vec<Vec<f64>> =
+        verdict.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let free: Vec<Vec<f64>> =
+        verdict.free_directions.iter().map(|twist| twist.iter().copied().collect()).collect();
+    json!({
+        "status": verdict.status.word(),
+        "reason": verdict.reason,
+        "fitness": verdict.fitness,
+        "overlap": verdict.overlap,
+        "rmse": verdict.rmse,
+        "correspondences": verdict.correspondences,
+        "covariance": rows,
+        "free_directions": free,
+    })
+}

@@ -1,0 +1,40 @@
+//! Tables of names and values.
+
+use serde_json::{Map, Value};
+
+/// A list of results that prints as a table or as one JSON object.
+#[derive(Default)]
+pub(crate) struct Report {
+    rows: Vec<(String, String)>,
+    json: Map<String, Value>,
+}
+
+impl Report {
+    /// Adds a line to the table and `key` to the JSON object.
+    pub(crate) fn add(&mut self, label: &str, text: impl Into<String>, key: &str, value: impl Into<Value>) {
+        self.rows.push((label.to_owned(), text.into()));
+        self.json.insert(key.to_owned(), value.into());
+    }
+
+    /// Adds to the JSON object only.
+    pub(crate) fn add_value(&mut self, key: &str, value: impl Into<Value>) {
+        self.json.insert(key.to_owned(), value.into());
+    }
+
+    /// Prints to standard output.
+    pub(crate) fn print(self, json: bool) {
+        if json {
+            println!("{}", Value::Object(self.json));
+            return;
+        }
+        print_rows(&self.rows);
+    }
+}
+
+/// Prints labels and texts in two columns.
+pub(crate) fn print_rows(rows: &[(String, String)]) {
+    let width = rows.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
+    for (label, text) in rows {
+        println!("{label:<width$}  {text}");
+    }
+}
