@@ -58,8 +58,7 @@ impl Surface {
     ) -> Option<(f64, usize)> {
         let ray = Ray::new(to_parry(origin), to_parry(direction));
         let hit = self.mesh.cast_local_ray_and_get_normal(&ray, max_distance, false)?;
-        // Both faces of triangle i can be hit; parry numbers the back faces from n on.
-        Some((hit.time_of_impact, hit.feature.unwrap_face() as usize % self.mesh.num_triangles()))
+        Some((hit.time_of_impact, hit.subshape as usize))
     }
 
     /// Indices of the triangles whose bounding boxes touch `aabb`, ascending.
@@ -77,4 +76,28 @@ fn to_parry(v: &Vec3) -> Vector {
 
 fn from_parry(v: Vector) -> Vec3 {
     Vec3::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_names_the_triangle_that_it_meets_first() {
+        // Five parallel triangles at z = 0, 1, ... 4, facing upwards.
+        let corner = |i: usize| {
+            let (x, y) = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)][i % 3];
+            Vec3::new(x, y, (i / 3) as f64)
+        };
+        let vertices: Vec<Vec3> = (0..15).map(corner).collect();
+        let triangles: Vec<[u32; 3]> = (0..5).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let surface = Surface::new(&vertices, &triangles).unwrap();
+        for (z, direction, expected) in
+            [(2.5, Vec3::z(), (0.5, 3)), (2.25, -Vec3::z(), (0.25, 2)), (9.0, -Vec3::z(), (5.0, 4))]
+        {
+            let hit = surface.cast_ray(&Vec3::new(0.2, 0.2, z), &direction, 10.0);
+            assert_eq!(hit, Some(expected));
+        }
+        assert!(surface.cast_ray(&Vec3::new(0.2, 0.2, 9.0), &-Vec3::z(), 4.9).is_none());
+    }
 }
