@@ -1,6 +1,6 @@
 //! From a raw scan to oriented points in the sensor frame.
 
-use crate::geometry::{KdTree, Scan, Vec3, fit_plane};
+use crate::geometry::{Cloud, KdTree, Scan, Vec3, fit_plane};
 use crate::voxel::CellIndex;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -70,6 +70,29 @@ impl PreparedScan {
             }
         }
         Ok(prepared)
+    }
+
+    /// A cloud that has normals already; each point counts as seen head on.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there are fewer than 10 points or most coincide.
+    pub fn of_cloud(cloud: &Cloud) -> Result<PreparedScan> {
+        let spacing = median_spacing(&cloud.points);
+        if cloud.len() < 10 || spacing <= 0.0 {
+            return Err(Error::input(format!(
+                "the cloud has {} points; at least 10 different ones are needed",
+                cloud.len()
+            )));
+        }
+        let known = cloud.sigma.iter().copied().filter(|s| s.is_finite()).collect();
+        Ok(PreparedScan {
+            points: cloud.points.clone(),
+            normals: cloud.normals.clone(),
+            rays: cloud.normals.iter().map(|n| -n).collect(),
+            spacing,
+            // Without a stated uncertainty the points are taken as they are.
+            noise: median(known).unwrap_or(0.1 * spacing),
+        })
     }
 
     /// One point a cubic cell, so that about `count` remain: indices, ascending by cell.

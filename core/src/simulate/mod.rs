@@ -14,11 +14,11 @@ mod stereo;
 mod views;
 
 pub use noise::{FLYING, GOOD, NoiseFamily, OUTLIER};
-pub use robot::PoseSigma;
 pub use views::view_poses;
 
 use crate::geometry::{Pose, Scan, Vec3};
 use crate::mesh::Mesh;
+use crate::scans::PoseSigma;
 use crate::{Progress, Result};
 
 crate::params! {

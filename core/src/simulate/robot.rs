@@ -2,16 +2,8 @@
 
 use super::noise::{Dice, NoiseFamily, Use, direction};
 use crate::geometry::{Pose, Twist, exp};
+use crate::scans::PoseSigma;
 use rand::RngExt;
-
-/// Standard deviation per axis of xi in `T_true = T_reported exp(xi)`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseSigma {
-    /// Metres.
-    pub translation: f64,
-    /// Radians.
-    pub rotation: f64,
-}
 
 /// Stated of exact poses: far below any sensor's noise, yet not zero, so that its inverse is finite.
 const EXACT: f64 = 1e-6;

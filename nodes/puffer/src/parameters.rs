@@ -32,9 +32,14 @@ impl ParameterArgs {
             }
         }
         for setting in &self.settings {
-            let parsed = setting.split_once('=').and_then(|(name, value)| Some((name.split_once('.')?, value)));
-            let ((group, field), value) = parsed
-                .ok_or_else(|| usage(format!("--set {setting}: expected NAME=VALUE, such as filter.noise_radius=0.002")))?;
+            let parsed = setting
+                .split_once('=')
+                .and_then(|(name, value)| Some((name.split_once('.')?, value)));
+            let ((group, field), value) = parsed.ok_or_else(|| {
+                usage(format!(
+                    "--set {setting}: expected NAME=VALUE, such as filter.noise_radius=0.002"
+                ))
+            })?;
             // What is no number and no boolean is a word.
             let value = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
             params.set(group, field, &value)?;

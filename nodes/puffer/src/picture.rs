@@ -10,7 +10,8 @@ use std::path::Path;
 pub(crate) fn write_png(path: &Path, image: &Image) -> Result<()> {
     let context = || format!("cannot write {}", path.display());
     let file = File::create(path).with_context(context)?;
-    let mut encoder = png::Encoder::new(BufWriter::new(file), image.width as u32, image.height as u32);
+    let mut encoder =
+        png::Encoder::new(BufWriter::new(file), image.width as u32, image.height as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let mut writer = encoder.write_header().with_context(context)?;

@@ -28,7 +28,8 @@ impl Watch {
     pub(crate) fn start() -> Watch {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(STEPS as u64);
-            let style = ProgressStyle::with_template("{msg:>12} [{bar:40}] {percent:>3} %  {elapsed}");
+            let style =
+                ProgressStyle::with_template("{msg:>12} [{bar:40}] {percent:>3} %  {elapsed}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });

@@ -11,7 +11,13 @@ pub(crate) struct Report {
 
 impl Report {
     /// Adds a line to the table and `key` to the JSON object.
-    pub(crate) fn add(&mut self, label: &str, text: impl Into<String>, key: &str, value: impl Into<Value>) {
+    pub(crate) fn add(
+        &mut self,
+        label: &str,
+        text: impl Into<String>,
+        key: &str,
+        value: impl Into<Value>,
+    ) {
         self.rows.push((label.to_owned(), text.into()));
         self.json.insert(key.to_owned(), value.into());
     }

@@ -30,7 +30,12 @@ impl Doctor {
             println!("{}", serde_json::Value::Object(checks.iter().map(entry).collect()));
         } else {
             for check in &checks {
-                println!("{}  {:<16}  {}", if check.good { "ok  " } else { "FAIL" }, check.name, check.found);
+                println!(
+                    "{}  {:<16}  {}",
+                    if check.good { "ok  " } else { "FAIL" },
+                    check.name,
+                    check.found
+                );
                 if !check.good {
                     println!("      mend: {}", check.mend);
                 }
@@ -45,7 +50,12 @@ impl Doctor {
 
 fn cores() -> Check {
     let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
-    Check { name: "processor cores", good: cores >= 1, found: cores.to_string(), mend: "check the process's CPU affinity (taskset -p $$)" }
+    Check {
+        name: "processor cores",
+        good: cores >= 1,
+        found: cores.to_string(),
+        mend: "check the process's CPU affinity (taskset -p $$)",
+    }
 }
 
 /// Enough for a few million points.
@@ -60,7 +70,8 @@ fn memory() -> Check {
     Check {
         name: "free memory",
         good: kilobytes.is_none_or(|kb| kb * 1024.0 / 1e9 >= LEAST_MEMORY_GB),
-        found: kilobytes.map_or_else(|| "unknown".into(), |kb| format!("{:.1} GB", kb * 1024.0 / 1e9)),
+        found: kilobytes
+            .map_or_else(|| "unknown".into(), |kb| format!("{:.1} GB", kb * 1024.0 / 1e9)),
         mend: "close other programs; 2 GB hold a few million points",
     }
 }

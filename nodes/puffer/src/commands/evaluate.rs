@@ -5,7 +5,7 @@ use crate::table::print_rows;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::assess::{AssessParams, Assessment, assess};
-use puffer_core::mesh::io::{read_mesh, read_points};
+use puffer_core::mesh::io::{read_cloud, read_mesh};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -34,8 +34,13 @@ pub struct Evaluate {
 impl Evaluate {
     pub(super) fn run(&self) -> Result<()> {
         let (mesh, truth) = (read_mesh(&self.mesh)?, read_mesh(&self.truth)?);
-        let seen = self.seen.as_deref().map(read_points).transpose()?;
-        let params = AssessParams { samples: self.samples, seed: self.seed, seen, ..AssessParams::default() };
+        let seen = self.seen.as_deref().map(read_cloud).transpose()?.map(|cloud| cloud.points);
+        let params = AssessParams {
+            samples: self.samples,
+            seed: self.seed,
+            seen,
+            ..AssessParams::default()
+        };
         let watch = Watch::start();
         let assessment = assess(&mesh, &truth, &params, watch.progress())?;
         watch.finish();

@@ -36,8 +36,12 @@ impl Filter {
         let filtered = match &input {
             Input::Scans(files) => {
                 let prepared = prepare(files, watch.progress())?;
-                let registration =
-                    register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
+                let registration = register_scans(
+                    &prepared,
+                    self.input.poses(),
+                    &params.register,
+                    watch.progress(),
+                )?;
                 filter_scans(&prepared, &registration, &params.filter, watch.progress())?
             }
             Input::Cloud(cloud) => {
@@ -47,7 +51,11 @@ impl Filter {
             }
         };
         watch.finish();
-        write_cloud(&self.output, &filtered.cloud, &[format!("puffer {}", env!("CARGO_PKG_VERSION"))])?;
+        write_cloud(
+            &self.output,
+            &filtered.cloud,
+            &[format!("puffer {}", env!("CARGO_PKG_VERSION"))],
+        )?;
         let mut report = Report::default();
         let points = filtered.cloud.len();
         report.add("points", format!("{points} of {}", filtered.measurements), "points", points);
@@ -58,7 +66,12 @@ impl Filter {
         ] {
             report.add(label, format!("{:.3} mm", value * 1e3), key, value * 1e3);
         }
-        report.add("written", self.output.display().to_string(), "cloud", self.output.display().to_string());
+        report.add(
+            "written",
+            self.output.display().to_string(),
+            "cloud",
+            self.output.display().to_string(),
+        );
         report.print(self.json);
         Ok(())
     }

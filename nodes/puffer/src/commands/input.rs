@@ -74,7 +74,11 @@ impl InputArgs {
 pub(crate) fn check_output(path: &Path, extensions: &[&str]) -> Result<()> {
     let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !extensions.contains(&given.as_str()) {
-        return Err(usage(format!("{}: the name must end in .{}", path.display(), extensions.join(", ."))));
+        return Err(usage(format!(
+            "{}: the name must end in .{}",
+            path.display(),
+            extensions.join(", .")
+        )));
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|f| !f.is_dir()) {

@@ -30,7 +30,9 @@ impl Params {
         } else if self.json {
             println!("{}", Value::from(specs.iter().map(as_json).collect::<Vec<_>>()));
         } else {
-            let rows = specs.iter().map(|s| (s.name.clone(), format!("{:<16}  {}", s.default.to_string(), describe(s))));
+            let rows = specs.iter().map(|s| {
+                (s.name.clone(), format!("{:<16}  {}", s.default.to_string(), describe(s)))
+            });
             print_rows(&rows.collect::<Vec<_>>());
         }
         Ok(())
@@ -57,7 +59,11 @@ fn group(spec: &ParamSpec) -> &str {
 
 fn describe(spec: &ParamSpec) -> String {
     let range = match (spec.range, spec.choices) {
-        (Some([low, high]), _) => format!(" ({low} to {high}{}{})", if spec.unit.is_empty() { "" } else { " " }, spec.unit),
+        (Some([low, high]), _) => format!(
+            " ({low} to {high}{}{})",
+            if spec.unit.is_empty() { "" } else { " " },
+            spec.unit
+        ),
         (None, []) => String::new(),
         (None, choices) => format!(" ({})", choices.join(", ")),
     };

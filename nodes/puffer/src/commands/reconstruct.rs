@@ -70,7 +70,12 @@ impl Reconstruct {
         if let Some(peak) = peak_memory() {
             report.add("peak memory", format!("{:.2} GB", peak / 1e9), "peak_memory_bytes", peak);
         }
-        report.add("written", self.output.display().to_string(), "mesh", self.output.display().to_string());
+        report.add(
+            "written",
+            self.output.display().to_string(),
+            "mesh",
+            self.output.display().to_string(),
+        );
         report
     }
 }
@@ -115,7 +120,8 @@ fn mesh_rows(report: &mut Report, mesh: &Mesh) {
     let measured: Vec<f64> = mesh.sigma.iter().copied().filter(|s| s.is_finite()).collect();
     let mean = measured.iter().sum::<f64>() / measured.len().max(1) as f64 * 1e3;
     let unobserved = 1.0 - measured.len() as f64 / vertices.max(1) as f64;
-    let text = format!("mean {mean:.3} mm; {:.1} % of the vertices not observed", unobserved * 100.0);
+    let text =
+        format!("mean {mean:.3} mm; {:.1} % of the vertices not observed", unobserved * 100.0);
     report.add("uncertainty", text, "mean_sigma_mm", mean);
     report.add_value("unobserved_share", unobserved);
 }

@@ -35,7 +35,8 @@ impl Register {
         let files = self.input.open_scans()?;
         let watch = Watch::start();
         let prepared = prepare(&files, watch.progress())?;
-        let registration = register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
+        let registration =
+            register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
         let times = watch.finish();
         let extras: Vec<Value> =
             registration.verdicts.iter().map(|v| json!({ "verdict": verdict_json(v) })).collect();
@@ -53,10 +54,21 @@ impl Register {
             );
             report.add(&prepared.names[i], text, &prepared.names[i], verdict.status.word());
         }
-        let accepted = registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
-        report.add("accepted", format!("{accepted} of {}", files.len()), "accepted_scans", accepted);
+        let accepted =
+            registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
+        report.add(
+            "accepted",
+            format!("{accepted} of {}", files.len()),
+            "accepted_scans",
+            accepted,
+        );
         let residual = registration.residual * 1e3;
-        report.add("residual", format!("{residual:.3} mm between overlapping scans"), "residual_mm", residual);
+        report.add(
+            "residual",
+            format!("{residual:.3} mm between overlapping scans"),
+            "residual_mm",
+            residual,
+        );
         let seconds: f64 = times.iter().map(|(_, time)| time.as_secs_f64()).sum();
         report.add("time", format!("{seconds:.1} s"), "seconds", seconds);
         report.print(self.json);

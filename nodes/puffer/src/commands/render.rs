@@ -42,10 +42,14 @@ impl Render {
     }
 
     fn pixels(&self) -> Result<(usize, usize)> {
-        let parsed = self.size.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+        let parsed =
+            self.size.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
         match parsed {
             Some((w, h)) if (16..=16384).contains(&w) && (16..=16384).contains(&h) => Ok((w, h)),
-            _ => Err(usage(format!("--size {}: expected two numbers from 16 to 16384, as in 1200x800", self.size))),
+            _ => Err(usage(format!(
+                "--size {}: expected two numbers from 16 to 16384, as in 1200x800",
+                self.size
+            ))),
         }
     }
 

@@ -1,0 +1,146 @@
+//! `puffer simulate`: a scan folder of an object, and apart from it the truth.
+
+use crate::failure::usage;
+use crate::progress::Watch;
+use crate::table::Report;
+use anyhow::{Context, Result};
+use clap::Args;
+use puffer_core::geometry::{Cloud, Surface, Vec3};
+use puffer_core::mesh::Mesh;
+use puffer_core::mesh::io::{Unit, read_mesh, write_cloud, write_mesh};
+use puffer_core::params::ParamValue;
+use puffer_core::scans::{ScanSet, SensorKind, View, write_poses, write_scans};
+use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, objects, simulate};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Scans with noise, outliers, drop-outs, occlusion and pose error; the truth goes to DIR.truth.
+#[derive(Args)]
+pub struct Simulate {
+    /// Object by name (`puffer objects` lists them), or a closed mesh file in metres
+    #[arg(long)]
+    object: String,
+    /// Set-up: kr16_laser or omnirob_stereo
+    #[arg(long, default_value = "kr16_laser")]
+    setup: String,
+    /// Noise family P1, P2K, P2 or P3 [default: that of the set-up]
+    #[arg(long, value_name = "FAMILY")]
+    noise: Option<String>,
+    /// Number of views, spread evenly over all directions
+    #[arg(long, default_value_t = SimulateParams::default().views)]
+    views: usize,
+    /// Scan folder to write
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Seed of all chance
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+impl Simulate {
+    pub(super) fn run(&self) -> Result<()> {
+        let mut params = SimulateParams { family: self.family()?, ..SimulateParams::default() };
+        params.set("views", &Value::from(self.views))?;
+        let truth = self.truth()?;
+        let watch = Watch::start();
+        let scans = simulate(&truth, &params, self.seed, watch.progress())?;
+        let times = watch.finish();
+        let truth_dir = self.truth_dir()?;
+        for folder in [&self.output, &truth_dir] {
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("cannot create {}", folder.display()))?;
+        }
+        write(&self.output, &truth_dir, &truth, &scans)?;
+        let mut report = Report::default();
+        let points: usize = scans.views.iter().map(|v| v.scan.returns().count()).sum();
+        report.add("views", scans.views.len().to_string(), "views", scans.views.len());
+        report.add("points", points.to_string(), "points", points);
+        report.add("noise", format!("{:?}", scans.family), "noise", scans.family.to_value());
+        report.add(
+            "scans",
+            self.output.display().to_string(),
+            "scans",
+            self.output.display().to_string(),
+        );
+        report.add(
+            "truth",
+            truth_dir.display().to_string(),
+            "truth",
+            truth_dir.display().to_string(),
+        );
+        let seconds: f64 = times.iter().map(|(_, time)| time.as_secs_f64()).sum();
+        report.add("time", format!("{seconds:.1} s"), "seconds", seconds);
+        report.print(self.json);
+        Ok(())
+    }
+
+    fn family(&self) -> Result<NoiseFamily> {
+        let of_setup =
+            NoiseFamily::of_setup(&self.setup).map_err(|error| usage(error.to_string()))?;
+        let Some(word) = &self.noise else { return Ok(of_setup) };
+        NoiseFamily::from_value(&Value::from(word.as_str())).ok_or_else(|| {
+            usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
+        })
+    }
+
+    fn truth(&self) -> Result<Mesh> {
+        let path = Path::new(&self.object);
+        if path.extension().is_none() && !path.exists() {
+            return Ok(objects::make(&self.object)?);
+        }
+        let mesh = read_mesh(path)?;
+        objects::check_ground_truth(&mesh).with_context(|| self.object.clone())?;
+        Ok(mesh)
+    }
+
+    /// `DIR.truth`, beside `DIR`.
+    fn truth_dir(&self) -> Result<PathBuf> {
+        let name = self.output.file_name().ok_or_else(|| {
+            usage(format!("-o {}: give a folder with a name of its own", self.output.display()))
+        })?;
+        let mut name = name.to_os_string();
+        name.push(".truth");
+        Ok(self.output.with_file_name(name))
+    }
+}
+
+fn write(dir: &Path, truth_dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<()> {
+    let sensor = if scans.family.is_stereo() { SensorKind::Stereo } else { SensorKind::Laser };
+    let view = |(i, view): (usize, &puffer_core::simulate::SimulatedView)| View {
+        name: format!("view_{i:03}"),
+        scan: view.scan.clone(),
+        object_from_sensor: view.reported_pose,
+    };
+    let set = ScanSet {
+        views: scans.views.iter().enumerate().map(view).collect(),
+        sensor: Some(sensor),
+        pose_sigma: Some(scans.pose_sigma),
+        nominal: Value::Null,
+    };
+    write_scans(dir, &set, &[])?;
+    let true_poses: Vec<_> = scans.views.iter().map(|v| v.true_pose).collect();
+    write_poses(&truth_dir.join("poses.json"), dir, Unit::M, &true_poses, &[])?;
+    write_mesh(&truth_dir.join("truth.ply"), truth, &[])?;
+    write_cloud(&truth_dir.join("seen.ply"), &seen(truth, scans)?, &[])?;
+    Ok(())
+}
+
+/// The points of the truth that the scans saw, with the truth's normals, object frame.
+fn seen(truth: &Mesh, scans: &SimulatedScans) -> Result<Cloud> {
+    let surface = Surface::new(&truth.vertices, &truth.triangles)?;
+    let mut cloud = Cloud::default();
+    for view in &scans.views {
+        for i in view.scan.returns() {
+            let hit = Vec3::from(view.hits[i].map(f64::from));
+            if hit.iter().all(|v| v.is_finite()) {
+                let point = view.true_pose.rotation * hit + view.true_pose.translation.vector;
+                let normal = truth.triangle_normal(surface.project(&point).triangle);
+                cloud.push(point, normal, f64::NAN, 1);
+            }
+        }
+    }
+    Ok(cloud)
+}
