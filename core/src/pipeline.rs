@@ -163,7 +163,7 @@ pub fn register_scans(
         Poses::Robot => {
             register(&prepared.scans, &prepared.robot, prepared.pose_sigma, params, progress)
         }
-        Poses::Exact => Ok(Registration::exact(&prepared.robot)),
+        Poses::Exact => Ok(Registration::exact(&prepared.scans, &prepared.robot)),
     }
 }
 

@@ -1,22 +1,47 @@
 //! One scan onto the map: iterative closest points, with the robot's pose as prior.
 
 use super::factors::{point_to_plane, point_to_point, tukey};
-use super::{Method, RegisterParams};
+use super::{Method, RegisterParams, median};
 use crate::geometry::{KdTree, Mat6, Pose, Twist, Vec3, exp, log};
+use crate::voxel::{Voxel, voxel_of};
 use nalgebra::SymmetricEigen;
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
-/// Oriented points in the object frame that scans are aligned to.
+/// Oriented points in the object frame that scans are aligned to: at most one a voxel and side, so that the map
+/// grows with the surface, not with the number of scans.
 pub(crate) struct Map {
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
+    voxel: f64,
+    taken: FxHashSet<(Voxel, usize)>,
     tree: KdTree,
 }
 
 impl Map {
-    pub(crate) fn new(points: Vec<Vec3>, normals: Vec<Vec3>) -> Map {
-        let tree = KdTree::new(&points);
-        Map { points, normals, tree }
+    /// An empty map with one point per voxel of edge `voxel` (metres).
+    pub(crate) fn new(voxel: f64) -> Map {
+        Map {
+            points: Vec::new(),
+            normals: Vec::new(),
+            voxel,
+            taken: FxHashSet::default(),
+            tree: KdTree::new(&[]),
+        }
+    }
+
+    /// Adds oriented points (sensor frame) seen from `pose`.
+    pub(crate) fn insert(&mut self, points: &[Vec3], normals: &[Vec3], pose: &Pose) {
+        for (p, n) in points.iter().zip(normals) {
+            let (point, normal) = (pose.rotation * p + pose.translation.vector, pose.rotation * n);
+            // The six sides of a cube are enough to keep the faces of a thin wall apart.
+            let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
+            if self.taken.insert((voxel_of(&point, self.voxel), side)) {
+                self.points.push(point);
+                self.normals.push(normal);
+            }
+        }
+        self.tree = KdTree::new(&self.points);
     }
 }
 
@@ -53,17 +78,27 @@ pub(crate) struct Alignment {
     pub information: Mat6,
 }
 
-/// Sums of one pass over the correspondences.
-struct Normal {
+/// A point of the scan and the point of the map that it should lie on.
+struct Correspondence {
+    point: Vec3,
+    target: Vec3,
+    /// Normal of the plane halfway between the two points' tangent planes, object frame.
+    normal: Vec3,
+    distance: f64,
+}
+
+/// Sums over the correspondences.
+struct System {
     hessian: Mat6,
     gradient: Twist,
-    squares: f64,
-    weight: f64,
+    rmse: f64,
     count: usize,
 }
 
 /// The radius shrinks to its end by this factor an iteration: slow enough to follow the alignment.
-const SHRINK: f64 = 0.8;
+const SHRINK: f64 = 0.75;
+/// A step below this many standard deviations of the pose does not matter any more.
+const SMALL_STEP: f64 = 0.1;
 
 pub(crate) fn align(
     moving: &Moving,
@@ -74,7 +109,7 @@ pub(crate) fn align(
 ) -> Alignment {
     let thesis = params.method == Method::Thesis;
     let mut pose = prior.pose;
-    let mut reach = if thesis { radius.start } else { radius.start.max(radius.end) };
+    let mut reach = radius.start;
     let mut converged = false;
     let mut system = assemble(moving, map, &pose, reach, params);
     for _ in 0..params.max_iterations {
@@ -86,22 +121,17 @@ pub(crate) fn align(
         }
         let Some(step) = solve(&hessian, &gradient) else { break };
         pose *= exp(&step);
-        let small = step.fixed_rows::<3>(0).norm() < 1e-6 && step.fixed_rows::<3>(3).norm() < 1e-5;
-        let at_end = thesis || reach <= radius.end;
-        reach = if thesis { reach } else { (reach * SHRINK).max(radius.end) };
+        let small = step.dot(&(hessian * step)) < SMALL_STEP * SMALL_STEP;
+        let at_end = reach <= radius.end;
+        reach = (reach * SHRINK).max(radius.end);
         system = assemble(moving, map, &pose, reach, params);
         if small && at_end {
             converged = true;
             break;
         }
     }
-    Alignment {
-        pose,
-        correspondences: system.count,
-        rmse: (system.squares / system.weight.max(f64::MIN_POSITIVE)).sqrt(),
-        converged,
-        information: system.hessian,
-    }
+    let System { hessian, rmse, count, .. } = system;
+    Alignment { pose, correspondences: count, rmse, converged, information: hessian }
 }
 
 fn solve(hessian: &Mat6, gradient: &Twist) -> Option<Twist> {
@@ -121,96 +151,81 @@ fn solve(hessian: &Mat6, gradient: &Twist) -> Option<Twist> {
     Some(step)
 }
 
+fn correspondences(
+    moving: &Moving,
+    map: &Map,
+    pose: &Pose,
+    reach: f64,
+    params: &RegisterParams,
+) -> Vec<Correspondence> {
+    let cosine = params.max_normal_angle.cos();
+    let find = |(p, normal): (&Vec3, &Vec3)| {
+        let moved = pose.rotation * p + pose.translation.vector;
+        let (index, _) = map.tree.nearest_within(&moved, reach)?;
+        let (target, there) = (map.points[index], map.normals[index]);
+        let here = pose.rotation * normal;
+        let agreement = there.dot(&here);
+        if agreement < cosine {
+            return None;
+        }
+        let normal = halfway(&there, &here, agreement);
+        Some(Correspondence { point: *p, target, normal, distance: normal.dot(&(moved - target)) })
+    };
+    moving.points.par_iter().zip(moving.normals).filter_map(find).collect()
+}
+
+/// The normal for which the curvature of the surface between two points cancels, so that the distance is right to
+/// third order (Rusinkiewicz 2019, A Symmetric Objective Function for ICP); `agreement` is `a . b`.
+pub(crate) fn halfway(a: &Vec3, b: &Vec3, agreement: f64) -> Vec3 {
+    (a + b) / (1.0 + agreement)
+}
+
 fn assemble(
     moving: &Moving,
     map: &Map,
     pose: &Pose,
     reach: f64,
     params: &RegisterParams,
-) -> Normal {
-    let cosine = params.max_normal_angle.cos();
-    // While the radius is wide, so is the kernel: residuals are misalignment then, not noise.
-    let scale = moving.noise.max(reach / 4.685);
-    let information = params.information_share / (moving.noise * moving.noise);
-    // Chunks of fixed size are summed in their order, so the result does not depend on the threads.
-    let partial: Vec<Normal> = moving
-        .points
-        .par_chunks(512)
-        .zip(moving.normals.par_chunks(512))
-        .map(|(points, normals)| {
-            let mut sum = Normal::zero();
-            for (p, normal) in points.iter().zip(normals) {
-                let moved = pose.rotation * p + pose.translation.vector;
-                let Some((index, _)) = map.tree.nearest_within(&moved, reach) else { continue };
-                if map.normals[index].dot(&(pose.rotation * normal)) < cosine {
-                    continue;
-                }
-                sum.add(
-                    pose,
-                    p,
-                    &map.points[index],
-                    &map.normals[index],
-                    scale,
-                    information,
-                    params.method,
-                );
-            }
-            sum
-        })
-        .collect();
-    partial.into_iter().fold(Normal::zero(), Normal::plus)
+) -> System {
+    let found = correspondences(moving, map, pose, reach, params);
+    if params.method == Method::Thesis {
+        return point_to_point_system(&found, pose, moving.noise);
+    }
+    // While the scan is still off, the residuals are misalignment, not noise: the kernel is as wide as they are.
+    let spread = median(found.iter().map(|c| c.distance.abs()).collect()).unwrap_or(0.0);
+    let scale = (1.4826 * spread).max(moving.noise);
+    let information = params.information_share / (scale * scale);
+    let mut system = System::empty();
+    let (mut squares, mut total) = (0.0, 0.0);
+    for c in &found {
+        let (r, jacobian) = point_to_plane(pose, &c.point, &c.target, &c.normal);
+        let weight = tukey(r / scale);
+        system.hessian += jacobian * jacobian.transpose() * (information * weight);
+        system.gradient += jacobian * (r * information * weight);
+        squares += weight * r * r;
+        total += weight;
+        system.count += usize::from(weight > 0.0);
+    }
+    system.rmse = (squares / f64::max(total, f64::MIN_POSITIVE)).sqrt();
+    system
 }
 
-impl Normal {
-    fn zero() -> Normal {
-        Normal {
-            hessian: Mat6::zeros(),
-            gradient: Twist::zeros(),
-            squares: 0.0,
-            weight: 0.0,
-            count: 0,
-        }
+fn point_to_point_system(found: &[Correspondence], pose: &Pose, noise: f64) -> System {
+    let mut system = System::empty();
+    let information = 1.0 / (noise * noise);
+    for c in found {
+        let (r, jacobian) = point_to_point(pose, &c.point, &c.target);
+        system.hessian += jacobian.transpose() * jacobian * information;
+        system.gradient += jacobian.transpose() * r * information;
+        system.rmse += r.norm_squared() / found.len() as f64;
     }
+    system.rmse = system.rmse.sqrt();
+    system.count = found.len();
+    system
+}
 
-    #[allow(clippy::too_many_arguments)] // one correspondence and how it counts
-    fn add(
-        &mut self,
-        pose: &Pose,
-        p: &Vec3,
-        m: &Vec3,
-        n: &Vec3,
-        scale: f64,
-        information: f64,
-        method: Method,
-    ) {
-        let weight = match method {
-            Method::Thesis => {
-                let (r, jacobian) = point_to_point(pose, p, m);
-                self.hessian += jacobian.transpose() * jacobian * information;
-                self.gradient += jacobian.transpose() * r * information;
-                self.squares += r.norm_squared();
-                1.0
-            }
-            Method::PointToPlane => {
-                let (r, jacobian) = point_to_plane(pose, p, m, n);
-                let weight = tukey(r / scale);
-                self.hessian += jacobian * jacobian.transpose() * (information * weight);
-                self.gradient += jacobian * (r * information * weight);
-                self.squares += weight * r * r;
-                weight
-            }
-        };
-        self.weight += weight;
-        self.count += usize::from(weight > 0.0);
-    }
-
-    fn plus(self, other: Normal) -> Normal {
-        Normal {
-            hessian: self.hessian + other.hessian,
-            gradient: self.gradient + other.gradient,
-            squares: self.squares + other.squares,
-            weight: self.weight + other.weight,
-            count: self.count + other.count,
-        }
+impl System {
+    fn empty() -> System {
+        System { hessian: Mat6::zeros(), gradient: Twist::zeros(), rmse: 0.0, count: 0 }
     }
 }

@@ -2,6 +2,7 @@
 //! robot's pose of each as prior (multi-view registration; Pulli 1999 for the problem, Barfoot 2017 for the
 //! perturbations). Without a fixed scan, so that the error is spread and the priors alone place the whole.
 
+use super::align::{Map, halfway};
 use super::factors::{scan_to_scan, tukey};
 use super::verdict::Status;
 use super::{PreparedScan, RegisterParams, Registration, median};
@@ -10,13 +11,17 @@ use crate::{Error, Progress, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Points of one scan thinned for registration, sensor frame, with their search tree.
+/// One scan made ready for registration, sensor frame.
 pub(crate) struct Sample {
+    /// The points that are aligned.
     pub points: Vec<Vec3>,
     pub normals: Vec<Vec3>,
+    /// Denser points, for others to be aligned to.
+    targets: Vec<Vec3>,
+    target_normals: Vec<Vec3>,
+    /// Distance between the targets, metres.
+    pub target_spacing: f64,
     pub noise: f64,
-    /// Distance between the sampled points, metres.
-    pub spacing: f64,
     /// Median distance of the points from the sensor, metres.
     pub distance: f64,
     /// Diagonal of the points' box, metres.
@@ -28,9 +33,12 @@ pub(crate) struct Sample {
 /// A point of one scan and the plane of another that it should lie on.
 #[derive(Clone, Copy)]
 pub(crate) struct Match {
+    /// Index of the point.
     pub point: usize,
-    pub target: usize,
-    /// Signed distance to the target's plane, metres.
+    /// A point of the plane, and its normal, in the other scan's frame.
+    pub target: Vec3,
+    pub plane: Vec3,
+    /// Signed distance to the plane, metres.
     pub distance: f64,
 }
 
@@ -38,18 +46,32 @@ impl Sample {
     pub(crate) fn new(scan: &PreparedScan, count: usize) -> Sample {
         let kept = scan.sample(count);
         let points: Vec<Vec3> = kept.iter().map(|&i| scan.points[i]).collect();
-        let density = (scan.points.len() as f64 / points.len().max(1) as f64).sqrt();
-        let bounds = Aabb::of(&points);
+        let dense = scan.sample(TARGETS);
+        let targets: Vec<Vec3> = dense.iter().map(|&i| scan.points[i]).collect();
+        let bounds = Aabb::of(&targets);
         Sample {
             normals: kept.iter().map(|&i| scan.normals[i]).collect(),
             noise: scan.noise.max(1e-6),
-            spacing: scan.spacing * density,
+            target_spacing: scan.spacing
+                * (scan.points.len() as f64 / targets.len().max(1) as f64).sqrt(),
             distance: median(points.iter().map(Vec3::norm).collect()).unwrap_or(0.0),
             extent: bounds.diagonal(),
-            tree: KdTree::new(&points),
+            tree: KdTree::new(&targets),
+            target_normals: dense.iter().map(|&i| scan.normals[i]).collect(),
+            targets,
             bounds,
             points,
         }
+    }
+
+    /// Adds the targets, seen from `pose`, to the map.
+    pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
+        map.insert(&self.targets, &self.target_normals, pose);
+    }
+
+    /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
+    pub(crate) fn reach(&self, noise: f64) -> f64 {
+        (3.0 * self.target_spacing).max(4.0 * noise)
     }
 
     /// For each point that has one, its closest point in `other` within `reach`, normals within `cosine`.
@@ -67,16 +89,18 @@ impl Sample {
                 return None;
             }
             let (target, _) = other.tree.nearest_within(&seen, reach)?;
-            let plane = &other.normals[target];
-            (plane.dot(&(other_from_self.rotation * normal)) >= cosine).then(|| Match {
-                point,
-                target,
-                distance: plane.dot(&(seen - other.points[target])),
-            })
+            let (there, here) = (&other.target_normals[target], other_from_self.rotation * normal);
+            let agreement = there.dot(&here);
+            let plane = halfway(there, &here, agreement);
+            let target = other.targets[target];
+            let distance = plane.dot(&(seen - target));
+            (agreement >= cosine).then_some(Match { point, target, plane, distance })
         })
     }
 }
 
+/// Targets kept of a scan: at a tenth of a million, searches take longer and find nothing better.
+const TARGETS: usize = 40_000;
 /// The radius shrinks to its end by this factor a pass.
 const SHRINK: f64 = 0.6;
 /// Gauss-Newton steps with the same correspondences.
@@ -100,8 +124,7 @@ pub(crate) fn optimise(
     let information = registration.pose_sigma.information();
     let noise =
         members.iter().map(|&i| samples[i].noise).fold(0.0, f64::max) * std::f64::consts::SQRT_2;
-    let spacing = members.iter().map(|&i| samples[i].spacing).fold(0.0, f64::max);
-    let end = (1.5 * spacing).max(4.0 * noise);
+    let end = members.iter().map(|&i| samples[i].reach(noise)).fold(0.0, f64::max);
     let mut reach = (4.0 * end)
         .min(end.max(3.0 * registration.pose_sigma.of_point(samples[members[0]].distance)));
     let mut hessian = DMatrix::zeros(0, 0);
@@ -195,15 +218,15 @@ fn system(
     let blocks: Vec<_> = pairs
         .par_iter()
         .map(|pair| {
-            let (a, b) = (&samples[members[pair.from]], &samples[members[pair.to]]);
+            let a = &samples[members[pair.from]];
             let mut sums = nalgebra::SMatrix::<f64, 12, 13>::zeros();
             for m in &pair.matches {
                 let (r, by_from, by_to) = scan_to_scan(
                     &poses[pair.from],
                     &poses[pair.to],
                     &a.points[m.point],
-                    &b.points[m.target],
-                    &b.normals[m.target],
+                    &m.target,
+                    &m.plane,
                 );
                 let weight = tukey(r / scale) * share / (scale * scale);
                 let mut row = nalgebra::SVector::<f64, 13>::zeros();
@@ -238,7 +261,7 @@ pub(crate) fn residual(samples: &[Sample], registration: &Registration) -> f64 {
         .filter(|&i| registration.verdicts[i].status == Status::Accepted)
         .collect();
     let poses: Vec<Pose> = members.iter().map(|&i| registration.poses[i]).collect();
-    let reach = samples.iter().map(|s| (2.0 * s.spacing).max(6.0 * s.noise)).fold(0.0, f64::max);
+    let reach = samples.iter().map(|s| s.reach(1.5 * s.noise)).fold(0.0, f64::max);
     let pairs = pairs(samples, &members, &poses, reach, 0.7);
     if pairs.is_empty() { f64::NAN } else { robust_scale(&pairs, 0.0) }
 }

@@ -45,7 +45,7 @@ crate::params! {
         /// A scan of which a smaller share finds correspondences is put aside.
         min_overlap: f64 = 0.1, in [0.0, 1.0];
         /// Points sampled from each scan.
-        samples: usize = 4000, in [50, 1000000];
+        samples: usize = 2000, in [50, 1000000];
         /// Iterations of one alignment at most.
         max_iterations: usize = 60, in [1, 1000];
         /// Rounds over the scans put aside at most.
@@ -76,14 +76,21 @@ pub struct Registration {
 
 impl Registration {
     /// The registration of scans whose poses `object_from_sensor` are known exactly.
-    pub fn exact(poses: &[Pose]) -> Registration {
+    pub fn exact(scans: &[PreparedScan], poses: &[Pose]) -> Registration {
         let pose_sigma = PoseSigma { translation: 0.0, rotation: 0.0 };
         let verdict = Verdict {
             reason: "pose given as exact".into(),
             ..Verdict::first(&pose_sigma.information())
         };
         let verdicts = vec![Verdict { free_directions: Vec::new(), ..verdict }; poses.len()];
-        Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN }
+        let mut registration =
+            Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN };
+        let samples: Vec<joint::Sample> = scans
+            .iter()
+            .map(|s| joint::Sample::new(s, RegisterParams::default().samples))
+            .collect();
+        registration.residual = joint::residual(&samples, &registration);
+        registration
     }
 }
 
@@ -113,6 +120,11 @@ pub fn register(
     let mut registration = stages::two_stages(&samples, robot, pose_sigma, params, progress)?;
     if params.joint && params.method != Method::Thesis {
         joint::optimise(&samples, robot, &mut registration, params, progress)?;
+        // The first scans' errors had moved the map away from the priors. It stands right now: what was refused
+        // for that reason has another chance.
+        if stages::place_rest(&samples, robot, &mut registration, params, progress)? > 0 {
+            joint::optimise(&samples, robot, &mut registration, params, progress)?;
+        }
     }
     registration.residual = joint::residual(&samples, &registration);
     Ok(registration)

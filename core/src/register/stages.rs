@@ -4,10 +4,11 @@ use super::align::{Map, Moving, Prior, Radius, align};
 use super::joint::Sample;
 use super::verdict::{Status, Verdict};
 use super::{Method, PoseSigma, RegisterParams, Registration};
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::Pose;
 use crate::{Progress, Result};
 
-/// Aligns all scans; those that no round could place are refused and keep the robot's pose.
+/// Aligns all scans to the first and to those accepted before them; those that no round could place are refused
+/// and keep the robot's pose.
 pub(crate) fn two_stages(
     samples: &[Sample],
     robot: &[Pose],
@@ -15,22 +16,44 @@ pub(crate) fn two_stages(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let mut poses = robot.to_vec();
-    let mut verdicts: Vec<Option<Verdict>> = vec![None; samples.len()];
-    verdicts[0] = Some(Verdict::first(&sigma.information()));
-    let mut waiting: Vec<usize> = (1..samples.len()).collect();
-    for round in 0..params.max_rounds {
+    let waiting = Verdict { status: Status::Deferred, ..Verdict::first(&sigma.information()) };
+    let mut verdicts = vec![waiting; samples.len()];
+    verdicts[0].status = Status::Accepted;
+    let mut registration =
+        Registration { poses: robot.to_vec(), verdicts, pose_sigma: sigma, residual: f64::NAN };
+    place_rest(samples, robot, &mut registration, params, progress)?;
+    Ok(registration)
+}
+
+/// Tries to place all scans that are not accepted; returns how many joined.
+pub(crate) fn place_rest(
+    samples: &[Sample],
+    robot: &[Pose],
+    registration: &mut Registration,
+    params: &RegisterParams,
+    progress: &Progress,
+) -> Result<usize> {
+    let (mut accepted, mut waiting): (Vec<usize>, Vec<usize>) =
+        (0..samples.len()).partition(|&i| registration.verdicts[i].status == Status::Accepted);
+    let before = accepted.len();
+    let mut map = Map::new(samples[0].target_spacing);
+    for &i in &accepted {
+        samples[i].add_to(&mut map, &registration.poses[i]);
+    }
+    for _ in 0..params.max_rounds {
         let mut aside = Vec::new();
-        for (done, &i) in waiting.iter().enumerate() {
-            let fraction = done as f64 / waiting.len() as f64;
-            progress.report("register", (round as f64 + fraction) / params.max_rounds as f64)?;
-            let (pose, verdict) = place(samples, i, &poses, &verdicts, robot, sigma, params);
+        for &i in &waiting {
+            progress.report("register", accepted.len() as f64 / samples.len() as f64)?;
+            let (pose, verdict) =
+                place(&samples[i], &map, &robot[i], registration.pose_sigma, params);
             if verdict.status == Status::Accepted {
-                poses[i] = pose;
+                registration.poses[i] = pose;
+                samples[i].add_to(&mut map, &pose);
+                accepted.push(i);
             } else {
                 aside.push(i);
             }
-            verdicts[i] = Some(verdict);
+            registration.verdicts[i] = verdict;
         }
         let stuck = aside.len() == waiting.len();
         waiting = aside;
@@ -38,61 +61,35 @@ pub(crate) fn two_stages(
             break;
         }
     }
-    let first =
-        |verdict: Option<Verdict>| verdict.unwrap_or_else(|| Verdict::first(&sigma.information()));
-    let mut verdicts: Vec<Verdict> = verdicts.into_iter().map(first).collect();
-    for verdict in verdicts.iter_mut().filter(|v| v.status == Status::Deferred) {
-        verdict.status = Status::Refused;
+    for i in waiting {
+        registration.verdicts[i].status = Status::Refused;
     }
-    Ok(Registration { poses, verdicts, pose_sigma: sigma, residual: f64::NAN })
+    Ok(accepted.len() - before)
 }
 
 fn place(
-    samples: &[Sample],
-    index: usize,
-    poses: &[Pose],
-    verdicts: &[Option<Verdict>],
-    robot: &[Pose],
+    sample: &Sample,
+    map: &Map,
+    robot: &Pose,
     sigma: PoseSigma,
     params: &RegisterParams,
 ) -> (Pose, Verdict) {
-    let accepted = |j: &usize| verdicts[*j].as_ref().is_some_and(|v| v.status == Status::Accepted);
-    let members: Vec<usize> = (0..samples.len()).filter(|j| *j != index).filter(accepted).collect();
-    let map = map_of(samples, &members, poses);
-    let sample = &samples[index];
-    let noise = members.iter().map(|&j| samples[j].noise).fold(sample.noise, f64::max)
-        * std::f64::consts::SQRT_2;
+    // A scan's noise and the map's.
+    let noise = sample.noise * std::f64::consts::SQRT_2;
     // The map stands where its first scan was believed to be: its error and the scan's add up.
     let information = sigma.information() / 2.0;
-    let prior = Prior { pose: robot[index], information };
+    let prior = Prior { pose: *robot, information };
     let moving = Moving { points: &sample.points, normals: &sample.normals, noise };
     let radius = radius(sample, sigma, noise, params);
-    let alignment = align(&moving, &map, &prior, radius, params);
-    // Within the end radius a uniform residual already has 0.58 of it: the bound must know the spacing too.
-    let expected = noise.max(0.3 * radius.end);
-    let verdict =
-        Verdict::of(&alignment, &robot[index], &information, sample.points.len(), expected, params);
+    let alignment = align(&moving, map, &prior, radius, params);
+    let verdict = Verdict::of(&alignment, robot, &information, sample.points.len(), noise, params);
     (alignment.pose, verdict)
 }
 
 fn radius(sample: &Sample, sigma: PoseSigma, noise: f64, params: &RegisterParams) -> Radius {
-    let end = (1.5 * sample.spacing).max(4.0 * noise);
-    let start = if params.radius > 0.0 {
-        params.radius
-    } else {
-        3.0 * std::f64::consts::SQRT_2 * sigma.of_point(sample.distance)
-    };
-    Radius { start: if params.method == Method::Thesis { start } else { start.max(end) }, end }
-}
-
-fn map_of(samples: &[Sample], members: &[usize], poses: &[Pose]) -> Map {
-    let mut points: Vec<Vec3> = Vec::new();
-    let mut normals = Vec::new();
-    for &j in members {
-        let pose = &poses[j];
-        points
-            .extend(samples[j].points.iter().map(|p| pose.rotation * p + pose.translation.vector));
-        normals.extend(samples[j].normals.iter().map(|n| pose.rotation * n));
-    }
-    Map::new(points, normals)
+    let end = sample.reach(noise);
+    let automatic = 3.0 * std::f64::consts::SQRT_2 * sigma.of_point(sample.distance);
+    let start = if params.radius > 0.0 { params.radius } else { automatic.max(end) };
+    // The thesis's radius stays as it is.
+    Radius { start, end: if params.method == Method::Thesis { start } else { end.min(start) } }
 }
