@@ -88,10 +88,10 @@ def two_components():
 
 
 def self_intersecting():
-    parts = [icosphere(4, 0.03), at(icosphere(4, 0.03), x=0.0213, y=0.0071, z=0.0031)]
-    union = (solid(parts[0]) + solid(parts[1])).to_mesh()
+    body, ball = asymmetric(), at(icosphere(4, 0.02), x=0.0213, y=0.0071, z=-0.0331)
+    union = (solid(body) + solid(ball)).to_mesh()
     truth = trimesh.Trimesh(union.vert_properties[:, :3], union.tri_verts, process=False)
-    return (trimesh.util.concatenate(parts), None), (truth, None)
+    return (noisy(trimesh.util.concatenate([body, ball]), 1e-4, 9), None), (truth, None)
 
 
 def shifted():
@@ -124,9 +124,9 @@ def mug():
 
 
 def open_result():
-    truth = icosphere(5, 0.05)
+    truth = asymmetric()
     result = noisy(truth, 3e-4, 7, smooth=1)
-    result.update_faces(result.triangles_center[:, 2] < 0.035)
+    result.update_faces(result.triangles_center[:, 0] < 0.0375)
     result.remove_unreferenced_vertices()
     return (result, None), (truth, None)
 
@@ -138,22 +138,22 @@ def open_truth():
 
 def broken():
     """A bow-tie vertex, a flipped triangle, a fin and a missing triangle."""
-    truth = trimesh.util.concatenate([icosphere(3, 0.03), at(icosphere(3, 0.03), x=0.08)])
-    faces = truth.faces.copy()
-    n = len(truth.vertices) // 2
-    right, left = np.argmax(truth.vertices[:n, 0]), n + np.argmin(truth.vertices[n:, 0])
-    vertices = truth.vertices.copy()
-    vertices[right] = vertices[left] = [0.04, 0, 0]
+    body = asymmetric()
+    truth = trimesh.util.concatenate([body, at(icosphere(3, 0.03), x=0.071)])
+    n = len(body.vertices)
+    left = n + np.argmin(truth.vertices[n:, 0])
+    # The ball's leftmost vertex becomes one with the body's nearest.
+    right = np.argmin(np.linalg.norm(body.vertices - truth.vertices[left], axis=1))
+    vertices, faces = truth.vertices.copy(), truth.faces.copy()
     faces[faces == left] = right
-    used = np.delete(np.arange(len(vertices)), left)
-    renumber = np.zeros(len(vertices), int)
-    renumber[used] = np.arange(len(used))
-    faces = renumber[faces]
-    faces[10] = faces[10][::-1]
-    vertices = np.vstack([vertices[used], [0.0, 0.0, 0.06]])
-    fin = [faces[200][0], faces[200][1], len(vertices) - 1]
-    faces = np.vstack([np.delete(faces, 700, axis=0), [fin]])
-    return (trimesh.Trimesh(vertices, faces, process=False), None), (truth, None)
+    flip, gone, base = len(faces) - 10, len(faces) - 700, faces[len(faces) - 200]
+    faces[flip] = faces[flip][::-1]
+    tip = vertices[base].mean(axis=0) * 1.01
+    faces = np.vstack([np.delete(faces, gone, axis=0), [[base[0], base[1], len(vertices)]]])
+    result = trimesh.Trimesh(np.vstack([vertices, [tip]]), faces, process=False)
+    result.remove_unreferenced_vertices()
+    result = noisy(result, 2e-4, 10)
+    return (result, None), (truth, None)
 
 
 PAIRS = {make.__name__: make for make in (
