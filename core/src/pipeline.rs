@@ -85,6 +85,7 @@ impl Input {
     /// # Errors
     /// [`Error::Io`], [`Error::Format`] or [`Error::Input`] with what is wrong and what to do.
     pub fn open(path: &Path, unit: Unit) -> Result<Input> {
+        std::fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
         let is_ply = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
         if is_ply && path.is_file() {
             return Ok(Input::Cloud(read_cloud_in(path, unit)?));

@@ -13,6 +13,8 @@ use rayon::prelude::*;
 const LEAST_SHARE: f64 = 0.08;
 /// Of the measurements near a point that has a surface, at least this share agree with it.
 const LEAST_AGREEMENT: f64 = 0.35;
+/// Radius within which standard deviations are pooled, in reduction radii: some thirty points.
+const POOL: f64 = 3.0;
 /// Seeds between two reports of progress.
 const BATCH: usize = 4096;
 
@@ -132,5 +134,23 @@ fn thin(fits: Vec<Fit>, reduction_radius: f64) -> Cloud {
     for (fit, _) in fits.iter().zip(kept).filter(|(_, kept)| *kept) {
         cloud.push(fit.point, fit.normal, fit.sigma, fit.support);
     }
+    cloud.sigma = pooled_sigma(&cloud, POOL * reduction_radius);
     cloud
+}
+
+/// The root mean square of the neighbours' standard deviations. One taken from a handful of scans is itself uncertain
+/// by a third; weights made of it would favour the points that are certain by luck alone.
+fn pooled_sigma(cloud: &Cloud, radius: f64) -> Vec<f64> {
+    let cells = CellIndex::new(&cloud.points, radius);
+    let pooled = |i: usize| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        cells.for_each_within(&cloud.points, &cloud.points[i], radius, |j, _| {
+            if cloud.normals[j].dot(&cloud.normals[i]) > 0.0 {
+                sum += cloud.sigma[j] * cloud.sigma[j];
+                count += 1.0;
+            }
+        });
+        f64::sqrt(sum / count)
+    };
+    (0..cloud.len()).into_par_iter().map(pooled).collect()
 }
