@@ -79,7 +79,7 @@ pub(crate) struct Alignment {
 }
 
 /// A point of the scan and the point of the map that it should lie on.
-struct Correspondence {
+pub(crate) struct Correspondence {
     point: Vec3,
     target: Vec3,
     /// Normal of the plane halfway between the two points' tangent planes, object frame.
@@ -151,7 +151,8 @@ fn solve(hessian: &Mat6, gradient: &Twist) -> Option<Twist> {
     Some(step)
 }
 
-fn correspondences(
+/// Pairs of the scan's points at `pose` and the map's within `reach`, normals alike.
+pub(crate) fn correspondences(
     moving: &Moving,
     map: &Map,
     pose: &Pose,

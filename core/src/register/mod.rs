@@ -41,14 +41,14 @@ crate::params! {
         /// Pairs whose normals differ by more are rejected.
         max_normal_angle: f64 = 0.785, in [0.0, 3.15], unit "rad";
         /// A scan with fewer correspondences is put aside.
-        min_correspondences: usize = 200, in [6, 1000000];
+        min_correspondences: usize = 100, in [6, 1000000];
         /// A scan of which a smaller share finds correspondences is put aside.
         min_overlap: f64 = 0.1, in [0.0, 1.0];
         /// Points sampled from each scan.
         samples: usize = 2000, in [50, 1000000];
         /// Iterations of one alignment at most.
         max_iterations: usize = 60, in [1, 1000];
-        /// Rounds over the scans put aside at most.
+        /// Times that a scan put aside is tried at most.
         max_rounds: usize = 5, in [1, 100];
         /// What a correspondence counts for beside the prior; below 1 because neighbours share their noise.
         information_share: f64 = 0.1, in [0.0001, 1.0];

@@ -1,11 +1,30 @@
 //! The two stages (Wiedemann 2014, §2.3.1): align each scan to the map, then try those put aside again.
 
-use super::align::{Map, Moving, Prior, Radius, align};
+use super::align::{Map, Moving, Prior, Radius, align, correspondences};
 use super::joint::Sample;
 use super::verdict::{Status, Verdict};
 use super::{Method, PoseSigma, RegisterParams, Registration};
 use crate::geometry::Pose;
 use crate::{Progress, Result};
+
+/// Points that tell how much of a scan overlaps: every so many.
+const OVERLAP_STRIDE: usize = 8;
+
+impl Sample {
+    /// How far a point may lie from where the robot's pose puts it, relative to the map's own error.
+    fn pose_reach(&self, sigma: PoseSigma) -> f64 {
+        3.0 * std::f64::consts::SQRT_2 * sigma.of_point(self.distance)
+    }
+
+    /// Sampled points near the map, normals alike, if the robot's pose is right.
+    fn overlap(&self, map: &Map, robot: &Pose, sigma: PoseSigma, params: &RegisterParams) -> usize {
+        let reach = self.pose_reach(sigma).max(self.target_spacing);
+        let points: Vec<_> = self.points.iter().copied().step_by(OVERLAP_STRIDE).collect();
+        let normals: Vec<_> = self.normals.iter().copied().step_by(OVERLAP_STRIDE).collect();
+        let moving = Moving { points: &points, normals: &normals, noise: self.noise };
+        correspondences(&moving, map, robot, reach, params).len()
+    }
+}
 
 /// Aligns all scans to the first and to those accepted before them; those that no round could place are refused
 /// and keep the robot's pose.
@@ -25,7 +44,8 @@ pub(crate) fn two_stages(
     Ok(registration)
 }
 
-/// Tries to place all scans that are not accepted; returns how many joined.
+/// Tries to place all scans that are not accepted, each time the one that overlaps most with the map; one that fails
+/// is put aside until the map has grown, at most `max_rounds` times. Returns how many joined.
 pub(crate) fn place_rest(
     samples: &[Sample],
     robot: &[Pose],
@@ -33,38 +53,44 @@ pub(crate) fn place_rest(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<usize> {
-    let (mut accepted, mut waiting): (Vec<usize>, Vec<usize>) =
+    let (accepted, mut waiting): (Vec<usize>, Vec<usize>) =
         (0..samples.len()).partition(|&i| registration.verdicts[i].status == Status::Accepted);
-    let before = accepted.len();
+    let sigma = registration.pose_sigma;
     let mut map = Map::new(samples[0].target_spacing);
     for &i in &accepted {
         samples[i].add_to(&mut map, &registration.poses[i]);
     }
-    for _ in 0..params.max_rounds {
-        let mut aside = Vec::new();
-        for &i in &waiting {
-            progress.report("register", accepted.len() as f64 / samples.len() as f64)?;
-            let (pose, verdict) =
-                place(&samples[i], &map, &robot[i], registration.pose_sigma, params);
-            if verdict.status == Status::Accepted {
-                registration.poses[i] = pose;
-                samples[i].add_to(&mut map, &pose);
-                accepted.push(i);
-            } else {
-                aside.push(i);
-            }
+    let mut tries = vec![0; samples.len()];
+    let mut joined = 0;
+    loop {
+        let mut order: Vec<(usize, usize)> = waiting
+            .iter()
+            .filter(|&&i| tries[i] < params.max_rounds)
+            .map(|&i| (samples[i].overlap(&map, &robot[i], sigma, params), i))
+            .collect();
+        order.sort_by_key(|&(overlap, i)| (std::cmp::Reverse(overlap), i));
+        let mut found = None;
+        for (_, i) in order {
+            progress.report("register", (accepted.len() + joined) as f64 / samples.len() as f64)?;
+            tries[i] += 1;
+            let (pose, verdict) = place(&samples[i], &map, &robot[i], sigma, params);
+            let good = verdict.status == Status::Accepted;
             registration.verdicts[i] = verdict;
+            if good {
+                registration.poses[i] = pose;
+                found = Some(i);
+                break;
+            }
         }
-        let stuck = aside.len() == waiting.len();
-        waiting = aside;
-        if waiting.is_empty() || stuck {
-            break;
-        }
+        let Some(i) = found else { break };
+        samples[i].add_to(&mut map, &registration.poses[i]);
+        waiting.retain(|&j| j != i);
+        joined += 1;
     }
     for i in waiting {
         registration.verdicts[i].status = Status::Refused;
     }
-    Ok(accepted.len() - before)
+    Ok(joined)
 }
 
 fn place(
@@ -88,8 +114,7 @@ fn place(
 
 fn radius(sample: &Sample, sigma: PoseSigma, noise: f64, params: &RegisterParams) -> Radius {
     let end = sample.reach(noise);
-    let automatic = 3.0 * std::f64::consts::SQRT_2 * sigma.of_point(sample.distance);
-    let start = if params.radius > 0.0 { params.radius } else { automatic.max(end) };
+    let start = if params.radius > 0.0 { params.radius } else { sample.pose_reach(sigma).max(end) };
     // The thesis's radius stays as it is.
     Radius { start, end: if params.method == Method::Thesis { start } else { end.min(start) } }
 }
