@@ -28,8 +28,12 @@ fn the_printed_file_gives_the_defaults() {
         let (group, field) = spec.name.split_once('.').unwrap();
         let other = match (spec.kind, spec.range) {
             ("boolean", _) => json!(!spec.default.as_bool().unwrap()),
-            ("choice", _) => spec.choices.iter().map(|c| json!(c)).find(|c| *c != spec.default).unwrap(),
-            ("integer", Some([low, high])) if spec.default == json!(low as u64) => json!(high as u64),
+            ("choice", _) => {
+                spec.choices.iter().map(|c| json!(c)).find(|c| *c != spec.default).unwrap()
+            }
+            ("integer", Some([low, high])) if spec.default == json!(low as u64) => {
+                json!(high as u64)
+            }
             ("integer", Some([low, _])) => json!(low as u64),
             (_, Some([low, high])) if spec.default.as_f64() == Some(low) => json!(high),
             (_, Some([low, _])) => json!(low),
@@ -42,7 +46,8 @@ fn the_printed_file_gives_the_defaults() {
     assert_ne!(params, Params::default());
     params.set_all(&document).unwrap();
     assert_eq!(params, Params::default());
-    let in_file: usize = document.as_object().unwrap().values().map(|g| g.as_object().unwrap().len()).sum();
+    let in_file: usize =
+        document.as_object().unwrap().values().map(|g| g.as_object().unwrap().len()).sum();
     assert_eq!(in_file, fields);
 }
 
