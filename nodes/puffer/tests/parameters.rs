@@ -1,5 +1,8 @@
 //! Parameters have one source: the struct fields.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use puffer_core::pipeline::Params;

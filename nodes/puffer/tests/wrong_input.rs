@@ -1,5 +1,8 @@
 //! Wrong input of every kind ends in one clear message and exit status 1 or 2: no panic, no file left behind.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{PUFFER, puffer, stdout};
