@@ -75,7 +75,7 @@ impl ParamValue for bool {
     }
 }
 
-/// Reads one field; used by [`params!`].
+/// Reads one field; used by [`params!`](crate::params!).
 ///
 /// # Errors
 /// [`Error::Parameter`] if the type is wrong or the value out of range.

@@ -2,8 +2,8 @@
 //!
 //! Both filters combine redundant measurements and thin the points to the reduction radius `r_red`, looking
 //! for measurements of the same surface within the noise radius `r_noise`. The default one fits a local quadric
-//! robustly to all scans' measurements ([`weighted`]); the thesis's averages in a slim neighbourhood along
-//! the normal ([`thesis`]).
+//! robustly to all scans' measurements (`weighted`); the thesis's averages in a slim neighbourhood along
+//! the normal (`thesis`).
 
 mod merged;
 mod quadric;

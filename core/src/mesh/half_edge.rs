@@ -262,7 +262,7 @@ fn next(h: u32) -> u32 {
 }
 
 fn previous(h: u32) -> u32 {
-    if h % 3 == 0 { h + 2 } else { h - 1 }
+    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }
 
 fn open(what: String) -> Error {

@@ -7,9 +7,9 @@ use crate::table::Report;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::mesh::io::write_cloud;
-use puffer_core::pipeline::{Input, filter_scans, prepare, register_scans};
+use puffer_core::pipeline::{Input, Params, Poses, filter_scans, prepare, register_scans};
 use puffer_core::register::PreparedScan;
-use puffer_core::{filter, geometry};
+use puffer_core::{Progress, filter, geometry};
 use std::path::PathBuf;
 
 /// Combines redundant measurements and drops outliers.
@@ -33,23 +33,8 @@ impl Filter {
         check_output(&self.output, &["ply"])?;
         let input = self.input.open()?;
         let watch = Watch::start();
-        let filtered = match &input {
-            Input::Scans(files) => {
-                let prepared = prepare(files, watch.progress())?;
-                let registration = register_scans(
-                    &prepared,
-                    self.input.poses(),
-                    &params.register,
-                    watch.progress(),
-                )?;
-                filter_scans(&prepared, &registration, &params.filter, watch.progress())?
-            }
-            Input::Cloud(cloud) => {
-                let scan = PreparedScan::of_cloud(cloud)?;
-                let scans = [(&scan, geometry::Pose::identity())];
-                filter::filter(&scans, f64::NAN, &params.filter, watch.progress())?
-            }
-        };
+        let filtered =
+            self.input.named(filtered(&input, self.input.poses(), &params, watch.progress()))?;
         watch.finish();
         write_cloud(
             &self.output,
@@ -74,5 +59,25 @@ impl Filter {
         );
         report.print(self.json);
         Ok(())
+    }
+}
+
+fn filtered(
+    input: &Input,
+    poses: Poses,
+    params: &Params,
+    progress: &Progress,
+) -> puffer_core::Result<filter::Filtered> {
+    match input {
+        Input::Scans(files) => {
+            let prepared = prepare(files, progress)?;
+            let registration = register_scans(&prepared, poses, &params.register, progress)?;
+            filter_scans(&prepared, &registration, &params.filter, progress)
+        }
+        Input::Cloud(cloud) => {
+            let scan = PreparedScan::of_cloud(cloud)?;
+            let scans = [(&scan, geometry::Pose::identity())];
+            filter::filter(&scans, f64::NAN, &params.filter, progress)
+        }
     }
 }

@@ -3,6 +3,7 @@
 use crate::failure::usage;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use puffer_core::Error;
 use puffer_core::mesh::io::Unit;
 use puffer_core::pipeline::{Input, Poses};
 use puffer_core::scans::ScanFiles;
@@ -53,6 +54,14 @@ impl InputArgs {
                 self.path.display()
             ))),
         }
+    }
+
+    /// Puts the input's name before an error that tells no file of its own.
+    pub(crate) fn named<T>(&self, result: puffer_core::Result<T>) -> Result<T> {
+        result.map_err(|error| match error {
+            Error::Input(_) => anyhow::Error::new(error).context(self.path.display().to_string()),
+            other => other.into(),
+        })
     }
 
     pub(crate) fn unit(&self) -> Unit {

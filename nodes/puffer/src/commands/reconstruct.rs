@@ -37,7 +37,8 @@ impl Reconstruct {
         check_output(&self.output, &["ply", "stl", "obj", "glb"])?;
         let input = self.input.open()?;
         let watch = Watch::start();
-        let outcome = run(&input, self.input.poses(), &params, watch.progress())?;
+        let outcome =
+            self.input.named(run(&input, self.input.poses(), &params, watch.progress()))?;
         let times = watch.finish();
         let comments = [
             format!("puffer {}", env!("CARGO_PKG_VERSION")),

@@ -34,9 +34,13 @@ impl Register {
         check_output(&self.output, &["json"])?;
         let files = self.input.open_scans()?;
         let watch = Watch::start();
-        let prepared = prepare(&files, watch.progress())?;
-        let registration =
-            register_scans(&prepared, self.input.poses(), &params.register, watch.progress())?;
+        let prepared = self.input.named(prepare(&files, watch.progress()))?;
+        let registration = self.input.named(register_scans(
+            &prepared,
+            self.input.poses(),
+            &params.register,
+            watch.progress(),
+        ))?;
         let times = watch.finish();
         let extras: Vec<Value> =
             registration.verdicts.iter().map(|v| json!({ "verdict": verdict_json(v) })).collect();

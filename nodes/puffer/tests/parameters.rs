@@ -1,0 +1,62 @@
+//! Parameters have one source: the struct fields.
+
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use puffer_core::pipeline::Params;
+use serde_json::{Value, json};
+use std::path::Path;
+
+fn printed() -> String {
+    common::stdout(Path::new("."), &["params", "--yaml"])
+}
+
+#[test]
+fn the_committed_file_is_what_the_program_prints() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../params/default.yaml");
+    let committed = std::fs::read_to_string(path).unwrap_or_default();
+    let same = committed == printed();
+    assert!(same, "params/default.yaml is out of date: puffer params --yaml > params/default.yaml");
+}
+
+#[test]
+fn the_printed_file_gives_the_defaults() {
+    let document: Value = serde_yaml_ng::from_str(&printed()).unwrap();
+    // From other values, so that a parameter left out of the file is noticed.
+    let mut params = Params::default();
+    let mut fields = 0;
+    for spec in Params::specs() {
+        let (group, field) = spec.name.split_once('.').unwrap();
+        let other = match (spec.kind, spec.range) {
+            ("boolean", _) => json!(!spec.default.as_bool().unwrap()),
+            ("choice", _) => {
+                spec.choices.iter().map(|c| json!(c)).find(|c| *c != spec.default).unwrap()
+            }
+            ("integer", Some([low, high])) if spec.default == json!(low as u64) => {
+                json!(high as u64)
+            }
+            ("integer", Some([low, _])) => json!(low as u64),
+            (_, Some([low, high])) if spec.default.as_f64() == Some(low) => json!(high),
+            (_, Some([low, _])) => json!(low),
+            _ => panic!("{}: no range", spec.name),
+        };
+        params.set(group, field, &other).unwrap();
+        assert_eq!(document[group][field], spec.default, "{}", spec.name);
+        fields += 1;
+    }
+    assert_ne!(params, Params::default());
+    params.set_all(&document).unwrap();
+    assert_eq!(params, Params::default());
+    let in_file: usize =
+        document.as_object().unwrap().values().map(|g| g.as_object().unwrap().len()).sum();
+    assert_eq!(in_file, fields);
+}
+
+#[test]
+fn every_parameter_is_described() {
+    for spec in Params::specs() {
+        assert!(spec.description.len() > 5, "{} has no description", spec.name);
+    }
+}
