@@ -90,7 +90,7 @@ pub(super) fn inflate(cloud: &Cloud, edge: f64, progress: &Progress) -> Result<M
         }
         move_guarded(&mut mesh, &targets);
         // Ours: besides the thesis's splits, short edges collapse and obtuse ones flip. Splits alone pile up slivers,
-        // whose beams meet their own neighbours and whose moves cut the mesh: it gets stuck half-way.
+        // whose beams meet their own neighbours and whose moves cut the mesh: it can get stuck half-way.
         edit_guarded(&mut mesh, |mesh, frozen| remesh(mesh, EDGE * edge, frozen));
     }
     Ok(mesh.into_mesh())
@@ -114,7 +114,7 @@ impl Spaces {
     }
 
     /// The voxel that surface encloses in the most of the 26 directions, among these the one farthest from it, and
-    /// that distance (metres). Ours: the thesis sets the seed by hand.
+    /// that distance (metres). Ours: where the seed stands.
     fn seed(&self, bounds: &Aabb) -> Option<(Voxel, f64)> {
         let (low, high) = (self.surface.voxel_of(&bounds.min), self.surface.voxel_of(&bounds.max));
         // A coarser grid finds the deepest place as well, and tries a thousandth of the voxels.

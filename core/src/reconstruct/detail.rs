@@ -44,7 +44,7 @@ pub(super) fn detail(
                 edit_guarded(mesh, |mesh, frozen| remesh(mesh, range, frozen))
             }
             // Ours: splits (of edges longer than the range, as in the thesis) go with collapses and flips. With splits
-            // alone slivers pile up until rounding makes them cut each other, and every later split is refused.
+            // alone slivers pile up, and once rounding makes them cut each other splits are refused as a whole.
             DetailMethod::Thesis => {
                 edit_guarded(mesh, |mesh, frozen| remesh(mesh, SPLIT_SHARE * range, frozen))
             }
