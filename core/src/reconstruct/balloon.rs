@@ -1,10 +1,10 @@
 //! The thesis's inflation (Wiedemann 2014, §2.4.2): a tetrahedron in one voxel of the inside space grows until no
-//! vertex can move safely. What is ours: where the seed stands, and that a move which would make the mesh cut
-//! itself is taken back.
+//! vertex can move safely. What is ours is marked so, with the reason.
 
 use super::guard::{edit_guarded, move_guarded};
+use super::shape::umbrella;
 use crate::geometry::{Aabb, Cloud, Surface, Vec3};
-use crate::mesh::remesh::{split_long, vertex_normals};
+use crate::mesh::remesh::{remesh, vertex_normals};
 use crate::mesh::{HalfEdgeMesh, Mesh};
 use crate::voxel::{Voxel, VoxelSpace, voxel_center};
 use crate::{Error, Progress, Result};
@@ -16,6 +16,15 @@ const STEP: f64 = 0.5;
 const NEIGHBOURHOOD: i32 = 2;
 /// Steps at most: ten times what the longest way across the box needs.
 const SLACK: f64 = 10.0;
+/// Edge length of the mesh in voxel edges: edges longer than 4/3 of it, the thesis's 2 l, are split.
+const EDGE: f64 = 1.5;
+/// Share of the umbrella displacement by which the mesh relaxes at each step.
+const RELAX: f64 = 0.5;
+/// Inflation ends when the volume has grown by less than this share in [`PATIENCE`] steps.
+const LEAST_GROWTH: f64 = 2e-4;
+const PATIENCE: usize = 6;
+/// Directions of the 26 that may escape from a seed: a side and its edges, which the object stood on, are nine.
+const ESCAPES: usize = 9;
 
 struct Spaces {
     edge: f64,
@@ -26,51 +35,87 @@ struct Spaces {
     reach: f64,
 }
 
+/// What the beam from a vertex says.
+enum Beam {
+    /// The vertex can move by this way, metres.
+    Safe(f64),
+    /// The surface, or another front of the mesh, is within reach of half a voxel.
+    Arrived,
+    /// It points into the mesh.
+    Inwards,
+    /// It meets no surface.
+    Escapes,
+}
+
+/// The mesh of a step, and what is asked of it for every vertex.
+struct Front {
+    own: Surface,
+    snapshot: Mesh,
+    normals: Vec<Vec3>,
+    spread: Vec<Vec3>,
+}
+
 /// The inflated mesh in voxels of edge `edge` (metres).
 ///
 /// # Errors
 /// [`Error::Input`] if no voxel is enclosed by the points; [`Error::Cancelled`].
 pub(super) fn inflate(cloud: &Cloud, edge: f64, progress: &Progress) -> Result<Mesh> {
     let bounds = Aabb::of(&cloud.points);
-    let mut surface = VoxelSpace::new(edge);
-    for point in &cloud.points {
-        let voxel = surface.voxel_of(point);
-        surface.set(voxel, true);
-    }
-    let mut spaces =
-        Spaces { edge, surface, inside: VoxelSpace::new(edge), reach: bounds.diagonal() + edge };
-    let seed = spaces.seed(&bounds).ok_or_else(|| {
+    let mut spaces = Spaces::new(cloud, &bounds, edge);
+    let (seed, depth) = spaces.seed(&bounds).ok_or_else(|| {
         Error::input(
             "no voxel is enclosed by the points: scan more sides, or use reconstruct.inflate = field, which \
              closes holes",
         )
     })?;
     spaces.inside.set(seed, true);
-    let mut mesh = HalfEdgeMesh::new(&tetrahedron(&voxel_center(seed, edge), edge))?;
+    // The seed's voxel is fully inside a tetrahedron with corners 1.5 voxels out; where less room is, a smaller one.
+    let mut mesh =
+        HalfEdgeMesh::new(&tetrahedron(&voxel_center(seed, edge), (1.55 * edge).min(0.3 * depth)))?;
     let most = (SLACK * bounds.diagonal() / edge) as usize;
+    let mut volumes = Vec::new();
     for step in 0..most {
         progress.report("inflate", step as f64 / (step as f64 + 100.0))?;
-        spaces.fill(&mesh.snapshot());
-        let (targets, moved) = spaces.targets(&mesh)?;
-        let held = if moved > 0 { move_guarded(&mut mesh, &targets) } else { 0 };
-        if moved == 0 || held >= moved {
+        let snapshot = mesh.snapshot();
+        spaces.fill(&snapshot);
+        volumes.push(snapshot.volume());
+        let grown = |before: &f64| volumes[step] > (1.0 + LEAST_GROWTH) * before;
+        // Ours: relaxing and pushing balance where nothing more can be won; waiting for the last vertex is in vain.
+        if step >= PATIENCE && !grown(&volumes[step - PATIENCE]) {
             break;
         }
-        edit_guarded(&mut mesh, |mesh, _| split_long(mesh, 2.0 * edge));
+        let (targets, moved) = spaces.targets(&mesh, snapshot)?;
+        if moved == 0 {
+            break;
+        }
+        move_guarded(&mut mesh, &targets);
+        // Ours: besides the thesis's splits, short edges collapse and obtuse ones flip. Splits alone pile up slivers,
+        // whose beams meet their own neighbours and whose moves cut the mesh: it can get stuck half-way.
+        edit_guarded(&mut mesh, |mesh, frozen| remesh(mesh, EDGE * edge, frozen));
     }
     Ok(mesh.into_mesh())
 }
 
-/// A regular tetrahedron round `center` that pokes a little out of its voxel on all sides.
-fn tetrahedron(center: &Vec3, edge: f64) -> Mesh {
+/// A regular tetrahedron round `center`, at four corners of a cube of half side `half` (metres).
+fn tetrahedron(center: &Vec3, half: f64) -> Mesh {
     let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-    let vertices = corners.map(|c| center + Vec3::from(c) * (0.5 * edge)).to_vec();
+    let vertices = corners.map(|c| center + Vec3::from(c) * half).to_vec();
     Mesh::new(vertices, vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 }
 
 impl Spaces {
-    /// The voxel, enclosed by surface in all 26 directions, that is farthest from it.
-    fn seed(&self, bounds: &Aabb) -> Option<Voxel> {
+    fn new(cloud: &Cloud, bounds: &Aabb, edge: f64) -> Spaces {
+        let mut surface = VoxelSpace::new(edge);
+        for point in &cloud.points {
+            let voxel = surface.voxel_of(point);
+            surface.set(voxel, true);
+        }
+        Spaces { edge, surface, inside: VoxelSpace::new(edge), reach: bounds.diagonal() + edge }
+    }
+
+    /// The voxel that surface encloses in the most of the 26 directions, among these the one farthest from it, and
+    /// that distance (metres). Ours: where the seed stands.
+    fn seed(&self, bounds: &Aabb) -> Option<(Voxel, f64)> {
         let (low, high) = (self.surface.voxel_of(&bounds.min), self.surface.voxel_of(&bounds.max));
         // A coarser grid finds the deepest place as well, and tries a thousandth of the voxels.
         let stride = ((high[0] - low[0]).max(high[1] - low[1]).max(high[2] - low[2]) / 40).max(1);
@@ -78,21 +123,28 @@ impl Spaces {
         let candidates: Vec<Voxel> = along(0)
             .flat_map(|x| along(1).flat_map(move |y| along(2).map(move |z| [x, y, z])))
             .collect();
-        let depths: Vec<f64> = candidates.par_iter().map(|v| self.depth(*v)).collect();
+        let found: Vec<(usize, f64)> = candidates.par_iter().map(|v| self.depth(*v)).collect();
         let best = (0..candidates.len())
-            .max_by(|&a, &b| depths[a].total_cmp(&depths[b]).then(b.cmp(&a)))?;
-        (depths[best] > 0.0).then(|| candidates[best])
+            .filter(|&i| found[i].0 <= ESCAPES && found[i].1 > 0.0)
+            .min_by(|&a, &b| {
+                let (one, two) = (found[a], found[b]);
+                one.0.cmp(&two.0).then(two.1.total_cmp(&one.1)).then(a.cmp(&b))
+            })?;
+        Some((candidates[best], found[best].1))
     }
 
-    /// Shortest distance to the surface over the 26 directions; 0 if one of them escapes.
-    fn depth(&self, voxel: Voxel) -> f64 {
+    /// How many of the 26 directions escape, and the shortest distance to the surface over the others.
+    fn depth(&self, voxel: Voxel) -> (usize, f64) {
         let center = voxel_center(voxel, self.edge);
-        let directions =
-            (0..27).filter(|i| *i != 13).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
-        directions
+        (0..27)
+            .filter(|i| *i != 13)
+            .map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1])
             .map(|d| Vec3::from_fn(|i, _| f64::from(d[i])).normalize())
-            .map(|d| self.to_surface(&center, &d).unwrap_or(0.0))
-            .fold(f64::INFINITY, f64::min)
+            .map(|d| self.to_surface(&center, &d))
+            .fold((0, f64::INFINITY), |(escapes, depth), way| match way {
+                Some(way) => (escapes, depth.min(way)),
+                None => (escapes + 1, depth),
+            })
     }
 
     fn to_surface(&self, from: &Vec3, direction: &Vec3) -> Option<f64> {
@@ -116,33 +168,74 @@ impl Spaces {
         }
     }
 
-    /// Where each vertex goes, and how many of them move.
-    fn targets(&self, mesh: &HalfEdgeMesh) -> Result<(Vec<Vec3>, usize)> {
-        let snapshot = mesh.snapshot();
-        let own = Surface::new(&snapshot.vertices, &snapshot.triangles)?;
-        let normals = vertex_normals(mesh);
-        let moves: Vec<Option<Vec3>> = (0..mesh.positions.len())
+    /// Where each vertex goes, and how many of them move safely.
+    fn targets(&self, mesh: &HalfEdgeMesh, snapshot: Mesh) -> Result<(Vec<Vec3>, usize)> {
+        let front = Front {
+            own: Surface::new(&snapshot.vertices, &snapshot.triangles)?,
+            snapshot,
+            normals: vertex_normals(mesh),
+            spread: umbrella(mesh),
+        };
+        let moves: Vec<(Vec3, bool)> = (0..mesh.positions.len())
             .into_par_iter()
-            .map(|v| self.safe_move(&own, &mesh.positions[v], &normals[v]))
+            .map(|v| {
+                if mesh.is_vertex(v as u32) { self.step(&front, v) } else { (Vec3::zeros(), false) }
+            })
             .collect();
-        let moved = moves.iter().flatten().count();
-        let targets =
-            mesh.positions.iter().zip(moves).map(|(p, m)| m.map_or(*p, |m| p + m)).collect();
-        Ok((targets, moved))
+        let moved = moves.iter().filter(|m| m.1).count();
+        Ok((mesh.positions.iter().zip(moves).map(|(p, m)| p + m.0).collect(), moved))
     }
 
-    /// `k min(d_s, l)` along the direction away from the inside voxels; `None` if the beam meets the mesh (it points
-    /// inwards) or no surface voxel (it would escape), or the vertex has arrived within half a voxel.
-    fn safe_move(&self, own: &Surface, vertex: &Vec3, normal: &Vec3) -> Option<Vec3> {
-        let direction = self.direction(vertex)?;
-        let free = self.to_surface(vertex, &direction)?;
-        // Start clear of the vertex's own triangles.
-        let start = vertex + direction * (1e-3 * self.edge);
-        let inwards = own.cast_ray(&start, &direction, free).is_some();
-        if inwards || direction.dot(normal) <= 0.0 || free <= 0.5 * self.edge {
-            return None;
+    /// The displacement of vertex `v`, and whether it is a safe move.
+    fn step(&self, front: &Front, v: usize) -> (Vec3, bool) {
+        let (vertex, normal) = (front.snapshot.vertices[v], front.normals[v]);
+        let direction = self.direction(&vertex);
+        let mut way = direction.unwrap_or(normal);
+        let mut beam = self.beam(front, &vertex, &normal, &way);
+        if matches!(beam, Beam::Inwards) {
+            // Ours: in a fold or a narrow place the inside voxels lie all round and decide nothing; the normal does.
+            way = normal;
+            beam = self.beam(front, &vertex, &normal, &way);
         }
-        Some(direction * (STEP * free.min(self.edge)))
+        // Ours: along the surface the vertices spread evenly, which keeps triangles well shaped.
+        let tangential = (front.spread[v] - normal * front.spread[v].dot(&normal)) * RELAX;
+        match beam {
+            Beam::Safe(free) => (way * free + tangential, true),
+            Beam::Arrived => (tangential, false),
+            // Ours: a vertex that cannot move by itself follows its neighbours like a membrane, so that holes in the
+            // points do not stop vertices one at a time and leave dents. It never crosses the surface.
+            Beam::Inwards | Beam::Escapes => {
+                let follow = front.spread[v] * RELAX;
+                let length = follow.norm();
+                let crosses = length > 0.0
+                    && self
+                        .to_surface(&vertex, &(follow / length))
+                        .is_some_and(|d| d < length + 0.5 * self.edge);
+                (if crosses { Vec3::zeros() } else { follow }, false)
+            }
+        }
+    }
+
+    /// What the beam from `vertex` along the unit vector `way` meets; the safe move is `k min(d_s, l)`.
+    fn beam(&self, front: &Front, vertex: &Vec3, normal: &Vec3, way: &Vec3) -> Beam {
+        if way.dot(normal) <= 0.0 {
+            return Beam::Inwards;
+        }
+        let Some(mut free) = self.to_surface(vertex, way) else { return Beam::Escapes };
+        // Ours: the beam starts a little above the vertex, clear of the vertex's own triangles.
+        let start = vertex + normal * (0.05 * self.edge);
+        if let Some((distance, triangle)) = front.own.cast_ray(&start, way, free) {
+            // Ours: only a triangle met from behind means that the beam points inwards. One met from outside is another
+            // front of the mesh, to which a way is free; the two fronts share it and keep a voxel between them.
+            if front.snapshot.triangle_normal(triangle).dot(way) >= 0.0 {
+                return Beam::Inwards;
+            }
+            free = free.min(0.5 * (distance - self.edge));
+        }
+        if free <= 0.5 * self.edge {
+            return Beam::Arrived;
+        }
+        Beam::Safe(STEP * free.min(self.edge))
     }
 
     /// Normalised sum of the vectors from the centres of the inside voxels near `vertex` to it.

@@ -6,7 +6,7 @@ use super::shape::{Smoothing, regularise, smooth, umbrella};
 use super::{DetailMethod, ReconstructParams, Scale};
 use crate::geometry::Vec3;
 use crate::mesh::HalfEdgeMesh;
-use crate::mesh::remesh::{remesh, split_long, vertex_normals};
+use crate::mesh::remesh::{remesh, vertex_normals};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
@@ -14,6 +14,10 @@ use rayon::prelude::*;
 const MOVES: usize = 2;
 /// Moves after the last change of the edges: the pull halves the distance left, or better, each time.
 const LAST_MOVES: usize = 4;
+/// First finding range of the thesis's detailing at least, in voxel edges.
+const THESIS_START: f64 = 2.0;
+/// Edge length, as a share of the finding range, for which remeshing splits what is longer than the range.
+const SPLIT_SHARE: f64 = 0.75;
 
 /// Brings `mesh` to the points, in `params.iterations` steps of the finding range
 /// `l_f = l_m + (i_max - i)/i_max (l_0 - l_m)`.
@@ -25,15 +29,25 @@ pub(super) fn detail(
     progress: &Progress,
 ) -> Result<()> {
     let last = params.iterations;
+    let start_edge = match params.detail {
+        DetailMethod::Implicit => scale.start_edge,
+        // The inflated mesh stays up to half a voxel away from a voxel whose point may be at its far corner: with less
+        // than the thesis's 2 l the first finding range would miss the points.
+        DetailMethod::Thesis => scale.start_edge.max(THESIS_START * scale.voxel),
+    };
     for i in 0..=last {
         progress.report("detail", i as f64 / (last + 1) as f64)?;
         let share = if last == 0 { 0.0 } else { (last - i) as f64 / last as f64 };
-        let range = scale.edge + share * (scale.start_edge - scale.edge);
+        let range = scale.edge + share * (start_edge - scale.edge);
         match params.detail {
             DetailMethod::Implicit => {
                 edit_guarded(mesh, |mesh, frozen| remesh(mesh, range, frozen))
             }
-            DetailMethod::Thesis => edit_guarded(mesh, |mesh, _| split_long(mesh, range)),
+            // Ours: splits (of edges longer than the range, as in the thesis) go with collapses and flips. With splits
+            // alone slivers pile up, and once rounding makes them cut each other splits are refused as a whole.
+            DetailMethod::Thesis => {
+                edit_guarded(mesh, |mesh, frozen| remesh(mesh, SPLIT_SHARE * range, frozen))
+            }
         }
         for step in 0..if i == last { LAST_MOVES } else { MOVES } {
             let settling = i == last && step + 1 == LAST_MOVES;
