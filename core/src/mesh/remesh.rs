@@ -22,7 +22,7 @@ pub fn remesh(mesh: &mut HalfEdgeMesh, target: f64, frozen: impl Fn(u32) -> bool
 }
 
 /// Splits every edge longer than `longest` (metres) in its middle until there is none.
-pub fn split_long(mesh: &mut HalfEdgeMesh, longest: f64) {
+fn split_long(mesh: &mut HalfEdgeMesh, longest: f64) {
     loop {
         let before = mesh.half_edges();
         let mut long: Vec<(u32, f64)> = (0..before)
