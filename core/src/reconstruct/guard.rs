@@ -126,7 +126,7 @@ mod tests {
             }
         });
         assert!(self_intersections(&mesh.snapshot()).is_empty());
-        assert!((mesh.positions[7] - shape.vertices[7]).norm() < 1e-12);
-        assert!((mesh.positions[30].norm() - 1.02).abs() < 1e-9);
+        assert_eq!(mesh.positions[7], stored(&shape.vertices[7]));
+        assert_eq!(mesh.positions[30], stored(&(shape.vertices[30] * 1.02)));
     }
 }
