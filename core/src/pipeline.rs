@@ -145,7 +145,7 @@ pub fn prepare(files: &ScanFiles, progress: &Progress) -> Result<Prepared> {
         prepared.names.push(view.name);
         prepared.robot.push(view.object_from_sensor);
     }
-    prepared.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    prepared.hash = hex(hash);
     progress.report("read", 1.0)?;
     Ok(prepared)
 }
@@ -186,13 +186,18 @@ pub fn filter_scans(
     filter(&scans, registration.residual, params, progress)
 }
 
+/// The digest in hexadecimal.
+fn hex(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// SHA-256 of a cloud's points and normals, in hexadecimal.
 pub fn cloud_hash(cloud: &Cloud) -> String {
     let mut hash = Sha256::new();
     for value in cloud.points.iter().chain(&cloud.normals).flat_map(|v| v.iter()) {
         hash.update(value.to_le_bytes());
     }
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(hash)
 }
 
 /// What the whole way gives.

@@ -93,11 +93,11 @@ pub fn filter(
 /// Radii from the data: wide enough for a dozen measurements of one scan, and for the noise (with the error
 /// of the poses) to be averaged over several times its own size, else the fitted plane tilts.
 fn radii(scans: &[(&PreparedScan, Pose)], residual: f64, params: &FilterParams) -> (f64, f64) {
-    let worst = |f: fn(&PreparedScan) -> f64| {
-        crate::register::median(scans.iter().map(|(scan, _)| f(scan)).collect()).unwrap_or(1e-3)
+    let typical = |f: fn(&PreparedScan) -> f64| {
+        crate::geometry::median(scans.iter().map(|(scan, _)| f(scan)).collect()).unwrap_or(1e-3)
     };
-    let noise = worst(|s| s.noise).max(if residual.is_finite() { residual } else { 0.0 });
-    let automatic = (2.5 * worst(|s| s.spacing)).max(4.0 * noise);
+    let noise = typical(|s| s.noise).max(if residual.is_finite() { residual } else { 0.0 });
+    let automatic = (2.5 * typical(|s| s.spacing)).max(4.0 * noise);
     let noise_radius = if params.noise_radius > 0.0 { params.noise_radius } else { automatic };
     let reduction =
         if params.reduction_radius > 0.0 { params.reduction_radius } else { noise_radius / 2.5 };

@@ -113,7 +113,7 @@ fn mean_normal(merged: &Merged, near: &[usize], start: &Vec3, cosine: f64) -> Op
 
 /// Keeps the best supported points, none closer than 0.7 of the reduction radius to another of its side.
 fn thin(fits: Vec<Fit>, reduction_radius: f64) -> Cloud {
-    let usual = crate::register::median(fits.iter().map(|f| f.effective).collect()).unwrap_or(0.0);
+    let usual = crate::geometry::median(fits.iter().map(|f| f.effective).collect()).unwrap_or(0.0);
     let fits: Vec<Fit> = fits.into_iter().filter(|f| f.effective >= LEAST_SHARE * usual).collect();
     let mut order: Vec<usize> = (0..fits.len()).collect();
     order.sort_by(|&a, &b| fits[b].effective.total_cmp(&fits[a].effective).then(a.cmp(&b)));

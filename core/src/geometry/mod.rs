@@ -4,6 +4,7 @@ mod aabb;
 mod cloud;
 mod fit;
 mod kdtree;
+mod median;
 mod pose;
 mod surface;
 
@@ -11,6 +12,7 @@ pub use aabb::Aabb;
 pub use cloud::{Cloud, Scan};
 pub use fit::{PlaneFit, any_orthogonal, fit_plane};
 pub use kdtree::KdTree;
+pub(crate) use median::median;
 pub use pose::{
     Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,
 };

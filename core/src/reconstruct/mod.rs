@@ -101,7 +101,7 @@ fn spacing(cloud: &Cloud) -> f64 {
     let tree = crate::geometry::KdTree::new(&cloud.points);
     let stride = cloud.len().div_ceil(2000).max(1);
     let fourth = |p: &Vec3| tree.nearest_n(p, 5).last().map(|n| n.1.sqrt());
-    crate::register::median(cloud.points.iter().step_by(stride).filter_map(fourth).collect())
+    crate::geometry::median(cloud.points.iter().step_by(stride).filter_map(fourth).collect())
         .unwrap_or(1e-3)
 }
 

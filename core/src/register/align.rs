@@ -1,8 +1,8 @@
 //! One scan onto the map: iterative closest points, with the robot's pose as prior.
 
 use super::factors::{point_to_plane, point_to_point, tukey};
-use super::{Method, RegisterParams, median};
-use crate::geometry::{KdTree, Mat6, Pose, Twist, Vec3, exp, log};
+use super::{Method, RegisterParams};
+use crate::geometry::{KdTree, Mat6, Pose, Twist, Vec3, exp, log, median};
 use crate::voxel::{Voxel, voxel_of};
 use nalgebra::SymmetricEigen;
 use rayon::prelude::*;

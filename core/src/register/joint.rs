@@ -5,8 +5,8 @@
 use super::align::{Map, halfway};
 use super::factors::{scan_to_scan, tukey};
 use super::verdict::Status;
-use super::{PreparedScan, RegisterParams, Registration, median};
-use crate::geometry::{Aabb, KdTree, Pose, Vec3, exp, log};
+use super::{PreparedScan, RegisterParams, Registration};
+use crate::geometry::{Aabb, KdTree, Pose, Vec3, exp, log, median};
 use crate::{Error, Progress, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

@@ -1,6 +1,7 @@
 //! Registration of scans (Wiedemann 2014, §2.3.1).
 //!
-//! Two stages, as in the thesis: each scan is aligned to the scans registered before it; those put aside are
+//! Two stages, as in the thesis: each scan is aligned to the scans registered before it, the one that overlaps
+//! most with them first; those put aside are
 //! tried again until none is left or nothing changes. By default the alignment is point-to-plane with the
 //! robot's pose as prior (maximum a posteriori), so that directions which the geometry leaves open stay where
 //! the robot says, and a joint optimisation over all accepted scans spreads the remaining error.
@@ -14,7 +15,6 @@ mod stages;
 mod verdict;
 
 pub use prepare::PreparedScan;
-pub(crate) use prepare::median;
 pub use verdict::{Status, Verdict};
 
 use crate::geometry::Pose;

@@ -1,6 +1,6 @@
 //! From a raw scan to oriented points in the sensor frame.
 
-use crate::geometry::{Cloud, KdTree, Scan, Vec3, fit_plane};
+use crate::geometry::{Cloud, KdTree, Scan, Vec3, fit_plane, median};
 use crate::voxel::CellIndex;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -157,15 +157,6 @@ fn median_spacing(points: &[Vec3]) -> f64 {
         .filter_map(|p| tree.nearest_n(p, 4).last().map(|f| f.1.sqrt()));
     // The third neighbour lies at about one grid step, also where the grid is stretched in one direction.
     median(nearest.collect()).unwrap_or(0.0)
-}
-
-/// Median; `None` of nothing.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 struct Neighbourhood<'a> {

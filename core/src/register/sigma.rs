@@ -1,8 +1,7 @@
 //! The uncertainty of the robot's poses.
 
 use super::joint::Sample;
-use super::median;
-use crate::geometry::{Mat6, Pose};
+use crate::geometry::{Mat6, Pose, median};
 use crate::scans::PoseSigma;
 
 /// No robot is better than this; it also keeps the information finite for poses called exact.

@@ -104,20 +104,20 @@ fn mesh_rows(report: &mut Report, mesh: &Mesh) {
     report.add("mesh", format!("{vertices} vertices, {triangles} triangles"), "vertices", vertices);
     report.add_value("triangles", triangles);
     let (closed, manifold, oriented) = (is_closed(mesh), is_two_manifold(mesh), is_oriented(mesh));
-    let genus = genus(mesh);
+    let (genus, components) = (genus(mesh), components(mesh));
     let text = format!(
         "closed {}, two-manifold {}, oriented {}, genus {}, components {}",
         yes(closed),
         yes(manifold),
         yes(oriented),
         genus.map_or_else(|| "undefined".to_owned(), |g| g.to_string()),
-        components(mesh)
+        components
     );
     report.add("topology", text, "closed", closed);
     report.add_value("two_manifold", manifold);
     report.add_value("oriented", oriented);
     report.add_value("genus", genus);
-    report.add_value("components", components(mesh));
+    report.add_value("components", components);
     let measured: Vec<f64> = mesh.sigma.iter().copied().filter(|s| s.is_finite()).collect();
     let mean = measured.iter().sum::<f64>() / measured.len().max(1) as f64 * 1e3;
     let unobserved = 1.0 - measured.len() as f64 / vertices.max(1) as f64;
