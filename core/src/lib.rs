@@ -12,6 +12,8 @@ pub mod mesh;
 pub mod scans;
 pub mod voxel;
 
+pub mod robot;
+
 pub mod register;
 
 pub mod filter;
@@ -19,6 +21,10 @@ pub mod filter;
 pub mod reconstruct;
 
 pub mod pipeline;
+
+pub mod view;
+
+pub mod session;
 
 pub mod simulate;
 

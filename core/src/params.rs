@@ -75,6 +75,39 @@ impl ParamValue for bool {
     }
 }
 
+/// A set of parameters by full name, `group.field`: one group of [`params!`](crate::params!), or several under
+/// [`param_groups!`](crate::param_groups!).
+pub trait Parameters: Clone + Default + Send + Sync + 'static {
+    /// What is known of each parameter, in the order of declaration.
+    fn all_specs() -> Vec<ParamSpec>;
+    /// Sets the parameter `group.field`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there is none of that name, or the value has the wrong type or is out of range.
+    fn set_named(&mut self, group: &str, field: &str, value: &Value) -> Result<()>;
+    /// The values with their full names, in the order of declaration.
+    fn all_values(&self) -> Vec<(String, Value)>;
+
+    /// Sets all that `document`, a map of groups to maps of fields, names.
+    ///
+    /// # Errors
+    /// As [`Parameters::set_named`], and [`Error::Parameter`] for what is no map.
+    fn set_all(&mut self, document: &Value) -> Result<()> {
+        let map = |value: &Value, name: &str| {
+            value.as_object().cloned().ok_or_else(|| Error::Parameter {
+                name: name.to_owned(),
+                message: format!("is {value}; expected a map such as `{name}: {{field: value}}`"),
+            })
+        };
+        for (group, fields) in map(document, "parameters")? {
+            for (field, value) in map(&fields, &group)? {
+                self.set_named(&group, &field, &value)?;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Reads one field; used by [`params!`](crate::params!).
 ///
 /// # Errors
@@ -111,6 +144,44 @@ macro_rules! choice {
             }
             fn from_value(value: &serde_json::Value) -> Option<Self> {
                 match value.as_str()? { $($word => Some($name::$variant),)* _ => None }
+            }
+        }
+    };
+}
+
+/// Declares a struct of parameter groups, each a struct of [`params!`](crate::params!), that implements
+/// [`Parameters`](crate::params::Parameters).
+#[macro_export]
+macro_rules! param_groups {
+    ($(#[$meta:meta])* pub struct $name:ident { $($(#[doc = $doc:literal])* $field:ident: $type:ty,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct $name { $($(#[doc = $doc])* pub $field: $type,)* }
+
+        impl $crate::params::Parameters for $name {
+            fn all_specs() -> Vec<$crate::params::ParamSpec> {
+                [$(<$type>::specs()),*].concat()
+            }
+            fn set_named(
+                &mut self, group: &str, field: &str, value: &serde_json::Value,
+            ) -> $crate::Result<()> {
+                match group {
+                    $(<$type>::GROUP => self.$field.set(field, value),)*
+                    _ => Err($crate::Error::Parameter {
+                        name: format!("{group}.{field}"),
+                        message: format!(
+                            "there is no group {group}; the groups are {}",
+                            [$(<$type>::GROUP),*].join(", ")
+                        ),
+                    }),
+                }
+            }
+            fn all_values(&self) -> Vec<(String, serde_json::Value)> {
+                let mut all = Vec::new();
+                $(all.extend(self.$field.values().into_iter().map(|(field, value)| {
+                    (format!("{}.{field}", <$type>::GROUP), value)
+                }));)*
+                all
             }
         }
     };

@@ -4,70 +4,22 @@ use crate::filter::{FilterParams, Filtered, filter};
 use crate::geometry::{Cloud, Pose};
 use crate::mesh::Mesh;
 use crate::mesh::io::{Unit, read_cloud_in};
-use crate::params::ParamSpec;
 use crate::reconstruct::{ReconstructParams, reconstruct};
 use crate::register::{PreparedScan, RegisterParams, Registration, Status, register};
 use crate::scans::{PoseSigma, ScanFiles};
 use crate::{Error, Progress, Result};
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
-/// Parameters of all stages.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Params {
-    /// Of the registration.
-    pub register: RegisterParams,
-    /// Of the filter.
-    pub filter: FilterParams,
-    /// Of the reconstruction.
-    pub reconstruct: ReconstructParams,
-}
-
-impl Params {
-    /// What is known of each parameter, stage by stage.
-    pub fn specs() -> Vec<ParamSpec> {
-        [RegisterParams::specs(), FilterParams::specs(), ReconstructParams::specs()].concat()
-    }
-
-    /// Sets the parameters that `document`, a map of groups to maps of fields, names.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for an unknown group or field, a wrong type or a value out of range.
-    pub fn set_all(&mut self, document: &Value) -> Result<()> {
-        let map = |value: &Value, name: &str| {
-            value.as_object().cloned().ok_or_else(|| Error::Parameter {
-                name: name.to_owned(),
-                message: format!("is {value}; expected a map such as `{name}: {{field: value}}`"),
-            })
-        };
-        for (group, fields) in map(document, "parameters")? {
-            for (field, value) in map(&fields, &group)? {
-                self.set(&group, &field, &value)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Sets one parameter.
-    ///
-    /// # Errors
-    /// As [`Params::set_all`].
-    pub fn set(&mut self, group: &str, field: &str, value: &Value) -> Result<()> {
-        match group {
-            RegisterParams::GROUP => self.register.set(field, value),
-            FilterParams::GROUP => self.filter.set(field, value),
-            ReconstructParams::GROUP => self.reconstruct.set(field, value),
-            _ => Err(Error::Parameter {
-                name: format!("{group}.{field}"),
-                message: format!(
-                    "there is no group {group}; the groups are {}, {} and {}",
-                    RegisterParams::GROUP,
-                    FilterParams::GROUP,
-                    ReconstructParams::GROUP
-                ),
-            }),
-        }
+crate::param_groups! {
+    /// Parameters of all stages.
+    pub struct Params {
+        /// Of the registration.
+        register: RegisterParams,
+        /// Of the filter.
+        filter: FilterParams,
+        /// Of the reconstruction.
+        reconstruct: ReconstructParams,
     }
 }
 

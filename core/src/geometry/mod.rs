@@ -6,6 +6,7 @@ mod fit;
 mod kdtree;
 mod median;
 mod pose;
+mod sensor;
 mod surface;
 
 pub use aabb::Aabb;
@@ -16,6 +17,7 @@ pub(crate) use median::median;
 pub use pose::{
     Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,
 };
+pub use sensor::{SensorModel, SensorRay, StereoModel, StriperModel};
 pub use surface::{Projection, Surface};
 
 /// A point or vector, metres.

@@ -3,6 +3,7 @@
 use crate::failure::usage;
 use anyhow::{Context, Result};
 use clap::Args;
+use puffer_core::params::Parameters;
 use puffer_core::pipeline::Params;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -42,7 +43,7 @@ impl ParameterArgs {
             })?;
             // What is no number and no boolean is a word.
             let value = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
-            params.set(group, field, &value)?;
+            params.set_named(group, field, &value)?;
         }
         Ok(params)
     }

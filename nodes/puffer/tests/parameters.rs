@@ -5,6 +5,7 @@
 
 mod common;
 
+use puffer_core::params::Parameters;
 use puffer_core::pipeline::Params;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -27,7 +28,7 @@ fn the_printed_file_gives_the_defaults() {
     // From other values, so that a parameter left out of the file is noticed.
     let mut params = Params::default();
     let mut fields = 0;
-    for spec in Params::specs() {
+    for spec in Params::all_specs() {
         let (group, field) = spec.name.split_once('.').unwrap();
         let other = match (spec.kind, spec.range) {
             ("boolean", _) => json!(!spec.default.as_bool().unwrap()),
@@ -42,7 +43,7 @@ fn the_printed_file_gives_the_defaults() {
             (_, Some([low, _])) => json!(low),
             _ => panic!("{}: no range", spec.name),
         };
-        params.set(group, field, &other).unwrap();
+        params.set_named(group, field, &other).unwrap();
         assert_eq!(document[group][field], spec.default, "{}", spec.name);
         fields += 1;
     }
@@ -56,7 +57,7 @@ fn the_printed_file_gives_the_defaults() {
 
 #[test]
 fn every_parameter_is_described() {
-    for spec in Params::specs() {
+    for spec in Params::all_specs() {
         assert!(spec.description.len() > 5, "{} has no description", spec.name);
     }
 }

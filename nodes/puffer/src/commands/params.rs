@@ -4,7 +4,7 @@ use crate::failure::usage;
 use crate::table::print_rows;
 use anyhow::Result;
 use clap::Args;
-use puffer_core::params::ParamSpec;
+use puffer_core::params::{ParamSpec, Parameters};
 use puffer_core::pipeline;
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ impl Params {
     }
 
     fn specs(&self) -> Result<Vec<ParamSpec>> {
-        let mut specs = pipeline::Params::specs();
+        let mut specs = pipeline::Params::all_specs();
         if let Some(node) = &self.node {
             let groups: Vec<String> = specs.iter().map(|s| group(s).to_owned()).collect();
             specs.retain(|s| group(s) == node);

@@ -1,0 +1,1 @@
+//! Robot model: kinematics, reachability, collisions and paths.

@@ -1,0 +1,1 @@
+//! The modelling loop as a pure state machine.

@@ -1,0 +1,1 @@
+//! Next best view (Wiedemann 2014, §2.2).

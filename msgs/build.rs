@@ -1,0 +1,3 @@
+//! Makes Rust types from the interface files.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Rust types from ROS 2 interface files.

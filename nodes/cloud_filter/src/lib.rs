@@ -1,0 +1,1 @@
+//! Registered scans to one filtered cloud.

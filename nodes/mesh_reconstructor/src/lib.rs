@@ -1,0 +1,1 @@
+//! Filtered cloud to a watertight mesh.

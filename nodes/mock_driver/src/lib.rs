@@ -1,0 +1,1 @@
+//! Simulated robot and sensor behind the topics of real ones.

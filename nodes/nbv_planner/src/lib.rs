@@ -1,0 +1,1 @@
+//! Registered scans and the robot to the next best view.

@@ -1,0 +1,1 @@
+//! Raw scans and tf to registered scans.
