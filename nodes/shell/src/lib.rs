@@ -17,6 +17,7 @@
 
 mod action;
 mod args;
+pub mod convert;
 mod diagnostics;
 mod entry;
 mod interfaces;
