@@ -1,1 +1,3 @@
 //! All ROS glue.
+
+pub mod bulk;
