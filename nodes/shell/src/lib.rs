@@ -42,3 +42,6 @@ pub use stamp::Stamp;
 pub use stop::Stop;
 pub use tf::{TfBroadcaster, TfBuffer, TfError, Transform};
 pub use topic::{Publisher, Subscription};
+//! All ROS glue.
+
+pub mod bulk;
