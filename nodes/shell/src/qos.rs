@@ -30,8 +30,8 @@ impl Profile {
 }
 
 /// Requests and replies: as rmw_qos_profile_services_default.
-pub(crate) fn service() -> QosPolicies {
-    build(true, Durability::Volatile, 10)
+pub(crate) fn service(depth: i32) -> QosPolicies {
+    build(true, Durability::Volatile, depth)
 }
 
 /// `/rosout` and `/parameter_events`: as rclcpp's, 1,000 samples deep.
