@@ -17,6 +17,7 @@
 
 mod action;
 mod args;
+pub mod convert;
 mod diagnostics;
 mod entry;
 mod interfaces;
@@ -41,3 +42,6 @@ pub use stamp::Stamp;
 pub use stop::Stop;
 pub use tf::{TfBroadcaster, TfBuffer, TfError, Transform};
 pub use topic::{Publisher, Subscription};
+//! All ROS glue.
+
+pub mod bulk;
