@@ -92,7 +92,11 @@ impl Diagnostics {
                 Health::Error => DiagnosticStatus::ERROR,
             },
             name: node.to_owned(),
-            message: if board.message.is_empty() { "running".to_owned() } else { board.message.clone() },
+            message: if board.message.is_empty() {
+                "running".to_owned()
+            } else {
+                board.message.clone()
+            },
             values,
             ..Default::default()
         };
@@ -123,7 +127,10 @@ impl Entry {
                 let recent = events.iter().filter(|at| now.duration_since(**at) <= RATE_WINDOW);
                 let rate = recent.count() as f64 / RATE_WINDOW.as_secs_f64();
                 let age = age.map_or("never".to_owned(), |age| format!("{age:.2}"));
-                vec![(format!("{key} rate (Hz)"), format!("{rate:.2}")), (format!("{key} age (s)"), age)]
+                vec![
+                    (format!("{key} rate (Hz)"), format!("{rate:.2}")),
+                    (format!("{key} age (s)"), age),
+                ]
             }
         }
     }

@@ -63,3 +63,8 @@ pub(crate) fn build(reliable: bool, durability: Durability, depth: i32) -> QosPo
         .lifespan(Lifespan { duration: Duration::INFINITE })
         .build()
 }
+
+/// What subscribers of `/tf_static` ask for: a latched message from each publisher.
+pub(crate) fn static_transforms() -> QosPolicies {
+    build(true, Durability::TransientLocal, 100)
+}

@@ -31,13 +31,7 @@ struct Endpoints {
 
 impl Graph {
     pub fn new(participant: GUID, name: NodeName, writer: DataWriter<Raw, RawAdapter>) -> Self {
-        Self {
-            participant,
-            name,
-            writer,
-            endpoints: Mutex::default(),
-            changed: Notify::new(),
-        }
+        Self { participant, name, writer, endpoints: Mutex::default(), changed: Notify::new() }
     }
 
     fn change(&self, change: impl FnOnce(&mut Endpoints)) {
@@ -46,11 +40,11 @@ impl Graph {
     }
 
     pub fn add_reader(&self, guid: GUID) {
-        self.change(|e| drop(e.readers.insert(Gid::from(guid))));
+        self.change(|e| e.readers.extend([Gid::from(guid)]));
     }
 
     pub fn add_writer(&self, guid: GUID) {
-        self.change(|e| drop(e.writers.insert(Gid::from(guid))));
+        self.change(|e| e.writers.extend([Gid::from(guid)]));
     }
 
     pub fn remove(&self, guid: GUID) {
@@ -81,9 +75,10 @@ impl Graph {
     fn announce(&self) {
         let info = {
             let endpoints = self.endpoints.lock().unwrap_or_else(PoisonError::into_inner);
-            let foreign = endpoints.foreign.as_ref().and_then(|context| {
-                context.participant_entities_info().nodes().first().cloned()
-            });
+            let foreign = endpoints
+                .foreign
+                .as_ref()
+                .and_then(|context| context.participant_entities_info().nodes().first().cloned());
             let mut node = foreign.unwrap_or_else(|| NodeEntitiesInfo::new(self.name.clone()));
             endpoints.readers.iter().for_each(|gid| node.add_reader(*gid));
             endpoints.writers.iter().for_each(|gid| node.add_writer(*gid));

@@ -9,8 +9,8 @@ use anyhow::{Context, Result};
 use futures::StreamExt;
 use graph::Graph;
 pub(crate) use matches::Matches;
-pub(crate) use raw::{Raw, Sample, encode};
 use raw::RawAdapter;
+pub(crate) use raw::{Raw, Sample, encode};
 use ros2_client::NodeName;
 use rustdds::no_key::{DataWriter, SimpleDataReader};
 use rustdds::policy::Durability;
@@ -36,13 +36,16 @@ impl Dds {
     /// Joins `domain`; must be called inside a tokio runtime. Its tasks end with `stop`.
     pub fn join(domain: u16, namespace: &str, name: &str, stop: &Stop) -> Result<Self> {
         let refused = || {
-            format!("cannot join DDS domain {domain}: is the network up, and are its UDP ports free?")
+            format!(
+                "cannot join DDS domain {domain}: is the network up, and are its UDP ports free?"
+            )
         };
         let participant = DomainParticipantBuilder::new(domain).build().with_context(refused)?;
         let qos = QosPolicies::qos_none();
         let publisher = participant.create_publisher(&qos).with_context(refused)?;
         let subscriber = participant.create_subscriber(&qos).with_context(refused)?;
-        let node_name = NodeName::new(namespace, name).with_context(|| format!("node name {name}"))?;
+        let node_name =
+            NodeName::new(namespace, name).with_context(|| format!("node name {name}"))?;
         let discovery = crate::qos::build(true, Durability::TransientLocal, 1);
         let topic = participant.create_topic(
             "ros_discovery_info".to_owned(),

@@ -192,9 +192,12 @@ impl PendingCall<'_> {
         let inner = self.inner;
         let first = match inner.mapping {
             ServiceMapping::Enhanced => self.sequences.first().copied(),
-            ServiceMapping::Cyclone => Some(*self.sequences.first().unwrap_or(
-                &inner.sequence.fetch_add(1, Ordering::Relaxed).saturating_add(1),
-            )),
+            ServiceMapping::Cyclone => Some(
+                *self
+                    .sequences
+                    .first()
+                    .unwrap_or(&inner.sequence.fetch_add(1, Ordering::Relaxed).saturating_add(1)),
+            ),
         };
         let (bytes, related) =
             wire::request(inner.mapping, payload, inner.writer.guid(), inner.reply_reader, first);
@@ -222,12 +225,7 @@ impl Drop for PendingCall<'_> {
 }
 
 /// Hands answers to the calls that wait for them.
-async fn dispatch(
-    reader: Reader,
-    inner: std::sync::Weak<Inner>,
-    stop: Stop,
-    dropped: Stop,
-) {
+async fn dispatch(reader: Reader, inner: std::sync::Weak<Inner>, stop: Stop, dropped: Stop) {
     while let Some(Some(sample)) = stop.or(dropped.or(reader.next())).await {
         let Some(inner) = inner.upgrade() else { return };
         let answer = sample.and_then(|sample| {

@@ -2,12 +2,14 @@
 
 mod client;
 mod server;
+mod task;
 mod wire;
 
 pub use client::Client;
 use puffer_msgs::Service;
-pub(crate) use server::{Call, Server};
+pub(crate) use server::Server;
 use std::time::Duration;
+pub(crate) use task::answer_all;
 
 /// As rmw_qos_profile_services_default.
 const SERVICE_QOS_DEPTH: i32 = 10;
@@ -50,6 +52,14 @@ pub enum CallError {
     ServerLost {
         /// Absolute name of the service.
         service: String,
+    },
+    /// A goal was accepted but has not ended.
+    #[error("{action} has not ended within {:.1} s", deadline.as_secs_f64())]
+    NoResult {
+        /// Absolute name of the action.
+        action: String,
+        /// How long was waited.
+        deadline: Duration,
     },
     /// The own node stops.
     #[error("call of {service} given up: the node stops")]

@@ -49,6 +49,10 @@ impl<S: Service> Server<S> {
         })
     }
 
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The next request that is not a repetition.
     pub async fn receive(&self) -> (Call, S::Request) {
         loop {
@@ -97,9 +101,10 @@ impl<S: Service> Server<S> {
             }
         };
         let (writer, asker) = (self.writer.guid(), call.asker.prefix);
-        let matched = self.writer.matches().wait(|matches| {
-            matches.of(writer).iter().any(|reader| reader.prefix == asker)
-        });
+        let matched = self
+            .writer
+            .matches()
+            .wait(|matches| matches.of(writer).iter().any(|reader| reader.prefix == asker));
         // An asker that has gone meanwhile is nothing to complain about.
         let _ = tokio::time::timeout(CLIENT_WAIT, matched).await;
         self.send(&payload, call.id);

@@ -44,7 +44,10 @@ pub(crate) fn request(
 }
 
 /// Which call a request belongs to, and its payload.
-pub(crate) fn read_request(mapping: ServiceMapping, sample: &Sample) -> Result<(CallId, Raw), String> {
+pub(crate) fn read_request(
+    mapping: ServiceMapping,
+    sample: &Sample,
+) -> Result<(CallId, Raw), String> {
     match mapping {
         ServiceMapping::Enhanced => {
             let own = sample.identity;
@@ -167,7 +170,8 @@ mod tests {
         let related = sent.1.unwrap();
         assert_eq!(related.writer_guid.to_bytes(), READER);
         assert_eq!((related.sequence_number.high(), related.sequence_number.low()), (-1, 0));
-        let (id, payload) = read_request(ServiceMapping::Enhanced, &sample(sent, WRITER, 7)).unwrap();
+        let (id, payload) =
+            read_request(ServiceMapping::Enhanced, &sample(sent, WRITER, 7)).unwrap();
         assert_eq!(id, CallId { client: READER, sequence: 7 });
         assert_eq!(&payload.body[..], b"abcd");
     }
@@ -208,7 +212,8 @@ mod tests {
         assert_eq!(sent.0[8..], [2, 1, 0, 0, 0, 0, 0, 0, b'a', b'b', b'c', b'd']);
         assert!(sent.1.is_none());
         let tag = sent.0[..8].to_vec();
-        let (id, payload) = read_request(ServiceMapping::Cyclone, &sample(sent, WRITER, 1)).unwrap();
+        let (id, payload) =
+            read_request(ServiceMapping::Cyclone, &sample(sent, WRITER, 1)).unwrap();
         assert_eq!((id.sequence, &payload.body[..]), (258, &b"abcd"[..]));
         let back = reply(ServiceMapping::Cyclone, b"yes", id);
         assert_eq!(back.0[..8], tag[..]);
