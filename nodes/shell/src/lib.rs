@@ -33,7 +33,6 @@ mod service;
 mod stamp;
 mod stop;
 mod tf;
-mod tf_topics;
 mod topic;
 
 pub use action::{ActionClient, Goal, GoalHandle, Outcome};
@@ -46,6 +45,5 @@ pub use qos::Profile;
 pub use service::{CallError, Client};
 pub use stamp::Stamp;
 pub use stop::Stop;
-pub use tf::{TfBuffer, TfError, Transform};
-pub use tf_topics::TfBroadcaster;
+pub use tf::{TfBroadcaster, TfBuffer, TfError, Transform};
 pub use topic::{Publisher, Subscription};

@@ -9,7 +9,7 @@ use crate::service::{Server, answer_all};
 use crate::{
     Action, ActionClient, Client, Diagnostics, Goal, Interface, Outcome, Profile, Publisher,
     RosArgs, Service, ServiceMapping, Stamp, Stop, Subscription, TfBroadcaster, TfBuffer, action,
-    logging, qos, tf_topics,
+    logging, qos, tf,
 };
 use anyhow::{Context, Result};
 use puffer_core::params::Parameters;
@@ -289,7 +289,7 @@ impl<P: Parameters> Node<P> {
         let mut heard = inner.tf_heard.lock().unwrap_or_else(PoisonError::into_inner);
         if !*heard {
             let topics = [&*self.resolve("/tf")?, &*self.resolve("/tf_static")?];
-            tf_topics::listen(&inner.dds, topics, &inner.tf, &inner.stop)?;
+            tf::subscribe(&inner.dds, topics, &inner.tf, &inner.stop)?;
             *heard = true;
         }
         Ok(inner.tf.clone())

@@ -1,8 +1,8 @@
 //! Transforms on `/tf` and `/tf_static`.
 
 use super::{TfBuffer, Transform};
-use crate::node::Core;
-use crate::{Profile, Publisher, Stamp, Subscription, qos};
+use crate::dds::Dds;
+use crate::{Profile, Publisher, Stamp, Stop, Subscription, qos};
 use anyhow::Result;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use puffer_core::geometry::Pose;
@@ -11,21 +11,24 @@ use puffer_msgs::tf2_msgs::msg::TFMessage;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Publishes transforms; clones share it.
+/// Publishes transforms, and tells them to the own node's [`TfBuffer`] too; clones share it.
 #[derive(Clone)]
 pub struct TfBroadcaster {
     moving: Publisher<TFMessage>,
     fixed: Publisher<TFMessage>,
     /// Static transforms by child frame: a latched topic keeps one message only.
     sent: Arc<Mutex<BTreeMap<String, Transform>>>,
+    own: TfBuffer,
 }
 
 impl TfBroadcaster {
-    pub(crate) fn new(core: &Core) -> Result<Self> {
+    /// `topics` are the resolved names of `/tf` and `/tf_static`.
+    pub(crate) fn new(dds: &Dds, topics: [&str; 2], own: TfBuffer) -> Result<Self> {
         Ok(Self {
-            moving: core.publisher_with("/tf", &qos::transforms())?,
-            fixed: core.publisher_with("/tf_static", &Profile::Latched.policies())?,
+            moving: Publisher::new(dds, topics[0], &qos::transforms())?,
+            fixed: Publisher::new(dds, topics[1], &Profile::Latched.policies())?,
             sent: Arc::default(),
+            own,
         })
     }
 
@@ -34,6 +37,7 @@ impl TfBroadcaster {
     /// # Errors
     /// The queue stayed full.
     pub fn send(&self, transforms: &[Transform]) -> Result<()> {
+        self.tell_own(transforms, false);
         self.moving.publish(&TFMessage { transforms: transforms.iter().map(to_ros).collect() })
     }
 
@@ -43,18 +47,31 @@ impl TfBroadcaster {
     /// # Errors
     /// The queue stayed full.
     pub fn send_static(&self, transforms: &[Transform]) -> Result<()> {
+        self.tell_own(transforms, true);
         let mut sent = self.sent.lock().unwrap_or_else(PoisonError::into_inner);
         for transform in transforms {
             sent.insert(transform.child.clone(), transform.clone());
         }
         self.fixed.publish(&TFMessage { transforms: sent.values().map(to_ros).collect() })
     }
+
+    /// On a host with loopback only, a DDS participant does not hear itself.
+    fn tell_own(&self, transforms: &[Transform], is_static: bool) {
+        for transform in transforms {
+            self.own.insert(transform.clone(), is_static);
+        }
+    }
 }
 
-/// Fills a buffer from `/tf` and `/tf_static` until the node stops.
-pub(crate) fn subscribe(core: &Core, buffer: &TfBuffer) -> Result<()> {
-    let moving = core.subscribe_with::<TFMessage>("/tf", &qos::transforms())?;
-    let fixed = core.subscribe_with::<TFMessage>("/tf_static", &qos::static_transforms())?;
+/// Fills a buffer from `/tf` and `/tf_static`, whose resolved names `topics` are, until `stop`.
+pub(crate) fn subscribe(
+    dds: &Dds,
+    topics: [&str; 2],
+    buffer: &TfBuffer,
+    stop: &Stop,
+) -> Result<()> {
+    let moving = Subscription::new(dds, topics[0], &qos::transforms(), stop.clone())?;
+    let fixed = Subscription::new(dds, topics[1], &qos::static_transforms(), stop.clone())?;
     tokio::spawn(fill(moving, buffer.clone(), false));
     tokio::spawn(fill(fixed, buffer.clone(), true));
     Ok(())
