@@ -1,7 +1,16 @@
 //! Transforms between frames over time.
 
+mod broadcaster;
+mod buffer;
+#[cfg(test)]
+mod tests;
+
 use crate::Stamp;
-use anyhow::{Result, bail};
+pub use broadcaster::TfBroadcaster;
+#[cfg(test)]
+use broadcaster::from_ros;
+pub(crate) use broadcaster::subscribe;
+pub use buffer::TfBuffer;
 use puffer_core::geometry::Pose;
 use std::time::Duration;
 
@@ -63,6 +72,16 @@ pub enum TfError {
         /// Newest of them.
         newest: Stamp,
     },
+    /// Frames hang on each other in a circle.
+    #[error(
+        "frame `{frame}` hangs on itself, through `{parent}`; two publishers give it different parents"
+    )]
+    Loop {
+        /// Where the walk began.
+        frame: String,
+        /// The frame that was met twice.
+        parent: String,
+    },
     /// The deadline passed; the last reason stands inside.
     #[error("no transform {target_frame} <- {source_frame} within {:.1} s: {reason}", deadline.as_secs_f64())]
     Deadline {
@@ -75,86 +94,4 @@ pub enum TfError {
         /// Why not.
         reason: Box<TfError>,
     },
-}
-
-/// Transforms of the last seconds; clones share it. Needs no node: a bag's transforms may be inserted.
-#[derive(Clone, Debug, Default)]
-pub struct TfBuffer {}
-
-impl TfBuffer {
-    /// A buffer that keeps the last `window` of stamps for each pair of frames.
-    pub fn new(window: Duration) -> Self {
-        let _ = window;
-        Self {}
-    }
-
-    /// Adds a transform; a static one holds for all times.
-    pub fn insert(&self, transform: Transform, is_static: bool) {
-        let _ = (transform, is_static);
-    }
-
-    /// `target_from_source` at `stamp`: a sample itself where one has that stamp, else between its neighbours
-    /// (linear, and spherical linear for the rotation).
-    ///
-    /// # Errors
-    /// See [`TfError`].
-    pub fn lookup(
-        &self,
-        target: &str,
-        source: &str,
-        stamp: Stamp,
-    ) -> std::result::Result<Pose, TfError> {
-        let _ = (target, stamp);
-        Err(TfError::UnknownFrame { frame: source.to_owned(), known: String::new() })
-    }
-
-    /// `target_from_source` at the newest stamp at which it is known, with that stamp.
-    ///
-    /// # Errors
-    /// See [`TfError`].
-    pub fn latest(
-        &self,
-        target: &str,
-        source: &str,
-    ) -> std::result::Result<(Pose, Stamp), TfError> {
-        let _ = target;
-        Err(TfError::UnknownFrame { frame: source.to_owned(), known: String::new() })
-    }
-
-    /// As [`TfBuffer::lookup`], but waits until the transform is known.
-    ///
-    /// # Errors
-    /// [`TfError::Deadline`] after `deadline` of wall time.
-    pub async fn wait(
-        &self,
-        target: &str,
-        source: &str,
-        stamp: Stamp,
-        deadline: Duration,
-    ) -> std::result::Result<Pose, TfError> {
-        let _ = deadline;
-        self.lookup(target, source, stamp)
-    }
-}
-
-/// Publishes transforms.
-#[derive(Clone)]
-pub struct TfBroadcaster {}
-
-impl TfBroadcaster {
-    /// Publishes on `/tf`.
-    ///
-    /// # Errors
-    /// The queue stayed full.
-    pub fn send(&self, transforms: &[Transform]) -> Result<()> {
-        bail!("not yet: {}", transforms.len())
-    }
-
-    /// Publishes on `/tf_static`, together with all static transforms sent before, so that late joiners get them.
-    ///
-    /// # Errors
-    /// The queue stayed full.
-    pub fn send_static(&self, transforms: &[Transform]) -> Result<()> {
-        bail!("not yet: {}", transforms.len())
-    }
 }
