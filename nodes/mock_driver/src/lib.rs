@@ -34,7 +34,11 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     serve_motion(&node, &machine)?;
     serve_scans(&node, &machine)?;
     serve_objects(&node, &machine)?;
-    tracing::info!("ready: {} before {}", node.params().driver.object, node.params().driver.setup.name());
+    tracing::info!(
+        "ready: {} before {}",
+        node.params().driver.object,
+        node.params().driver.setup.name()
+    );
     while stop.or(tokio::time::sleep(HEARTBEAT)).await.is_some() {
         // While it moves it ticks by itself.
         if let Ok(machine) = machine.try_lock() {
@@ -53,7 +57,10 @@ fn serve_motion(node: &Node<Params>, machine: &Arc<Mutex<Machine>>) -> Result<()
             let machine = Arc::clone(&machine);
             async move {
                 let Ok(mut machine) = machine.try_lock() else {
-                    return refused(FollowJointTrajectoryResult::INVALID_GOAL, "the robot is busy".into());
+                    return refused(
+                        FollowJointTrajectoryResult::INVALID_GOAL,
+                        "the robot is busy".into(),
+                    );
                 };
                 let way = match machine.plan(goal.request()) {
                     Ok(way) => way,
@@ -88,7 +95,9 @@ fn serve_scans(node: &Node<Params>, machine: &Arc<Mutex<Machine>>) -> Result<()>
                 return TriggerResponse { success: false, message: "the robot is moving".into() };
             };
             match machine.scan().await {
-                Ok(points) => TriggerResponse { success: true, message: format!("{points} points") },
+                Ok(points) => {
+                    TriggerResponse { success: true, message: format!("{points} points") }
+                }
                 Err(error) => {
                     tracing::warn!("no scan: {error:#}");
                     TriggerResponse { success: false, message: format!("{error:#}") }

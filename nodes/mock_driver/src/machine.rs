@@ -4,8 +4,8 @@ use crate::outputs::Outputs;
 use crate::{DriverParams, Params, motion};
 use anyhow::{Context, Result, anyhow};
 use puffer_core::geometry::Scan;
-use puffer_core::mesh::io::{read_mesh, write_cloud, write_mesh};
 use puffer_core::mesh::Mesh;
+use puffer_core::mesh::io::{read_mesh, write_cloud, write_mesh};
 use puffer_core::robot::{SENSOR_FRAME, Trajectory, description};
 use puffer_core::simulate::{Cell, objects};
 use puffer_msgs::control_msgs::action::FollowJointTrajectoryGoal;
@@ -63,7 +63,11 @@ impl Machine {
 
     /// Moves along `way`, faster than the clock on the wall, until its end or until `stop` says so; whether the end
     /// was reached.
-    pub(crate) async fn follow(&mut self, way: &Trajectory, stop: impl Fn() -> bool) -> Result<bool> {
+    pub(crate) async fn follow(
+        &mut self,
+        way: &Trajectory,
+        stop: impl Fn() -> bool,
+    ) -> Result<bool> {
         let start = self.now;
         let steps = (way.duration() * self.params.rate).ceil().max(1.0) as usize;
         let mut wall = tokio::time::Instant::now();
@@ -171,7 +175,8 @@ fn reversed(way: &Trajectory) -> Trajectory {
 }
 
 fn load(params: &DriverParams) -> Result<Cell> {
-    let truth = truth(&params.object).with_context(|| format!("driver.object {}", params.object))?;
+    let truth =
+        truth(&params.object).with_context(|| format!("driver.object {}", params.object))?;
     Ok(Cell::new(params.setup.name(), truth, params.seed as u64)?)
 }
 

@@ -49,7 +49,9 @@ pub(crate) fn checked(
             continue;
         }
         if time <= before {
-            return Err(invalid(format!("point {index}: its time {time} s is not after {before} s")));
+            return Err(invalid(format!(
+                "point {index}: its time {time} s is not after {before} s"
+            )));
         }
         let last = trajectory.positions.last().map_or(q, Vec::as_slice);
         let needed = robot.joint_time(last, &next);
@@ -142,7 +144,11 @@ mod tests {
         );
         let mut other = goal(&[(1, 0.0)]);
         other.trajectory.joint_names[0] = "elbow".into();
-        says(other, FollowJointTrajectoryResult::INVALID_JOINTS, "no joint elbow; there are joint_a1");
+        says(
+            other,
+            FollowJointTrajectoryResult::INVALID_JOINTS,
+            "no joint elbow; there are joint_a1",
+        );
         let mut short = goal(&[(1, 0.0)]);
         short.trajectory.points[0].positions.clear();
         says(short, invalid, "0 positions for 1 joints");

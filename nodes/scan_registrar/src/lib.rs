@@ -4,15 +4,10 @@
 //! it, with the robot's pose as prior. Publishes `registered_scan` with a verdict, and after `~/refine` the
 //! `registered_poses` of all scans.
 
-mod intake;
 mod messages;
-mod observation;
-mod params;
 mod refine;
 
-pub use intake::{Intake, Registered};
-pub use observation::Observation;
-pub use params::{Params, ScanParams};
+pub use puffer_shell::scans::RegistrarParams as Params;
 
 use anyhow::{Context, Result};
 use puffer_core::register::Status;
@@ -23,6 +18,7 @@ use puffer_msgs::std_msgs::msg::String as Text;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::bulk::{BulkPublisher, BulkSubscription, Delivery, Mode};
 use puffer_shell::convert::status_from_message;
+use puffer_shell::scans::{Intake, Observation};
 use puffer_shell::{Node, Profile, RosArgs, Stamp, Stop, Subscription, TfBuffer};
 use std::sync::Arc;
 use std::time::Duration;

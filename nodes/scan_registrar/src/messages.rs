@@ -1,6 +1,5 @@
 //! What the registrar says of its scans.
 
-use crate::intake::{Intake, Registered};
 use puffer_core::geometry::Mat6;
 use puffer_core::register::Registration;
 use puffer_msgs::builtin_interfaces::msg::Time;
@@ -8,6 +7,7 @@ use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::Stamp;
 use puffer_shell::convert::{pose_message, pose_with_covariance, scan_message, status_message};
+use puffer_shell::scans::{Intake, Registered};
 
 fn header(stamp: Stamp, frame: &str) -> Header {
     let (sec, nanosec) = stamp.parts();

@@ -1,12 +1,12 @@
 //! The action that optimises all poses together.
 
-use crate::intake::Intake;
 use crate::{Params, messages};
 use anyhow::Result;
 use puffer_core::register::Status;
 use puffer_core::{Error, Progress};
 use puffer_msgs::action::{Refine, RefineFeedback, RefineGoal, RefineResult};
 use puffer_shell::bulk::{BulkPublisher, Mode};
+use puffer_shell::scans::Intake;
 use puffer_shell::{Goal, Node, Outcome};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -75,8 +75,7 @@ impl Desk {
         };
         let revision = self.revision.fetch_add(1, Ordering::Relaxed) + 1;
         let object = self.node.params().scan.object_frame;
-        let message =
-            messages::poses(&intake, &registration, revision, self.node.now(), &object);
+        let message = messages::poses(&intake, &registration, revision, self.node.now(), &object);
         drop(intake);
         if let Err(error) = self.poses.publish_message(&message).await {
             return failed(RefineResult::FAILED, error.to_string());

@@ -29,6 +29,7 @@ mod names;
 mod node;
 mod parameters;
 mod qos;
+pub mod scans;
 mod service;
 mod stamp;
 mod stop;

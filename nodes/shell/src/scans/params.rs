@@ -1,4 +1,4 @@
-//! Parameters of the registrar.
+//! Which points count, and how scans are registered.
 
 use puffer_core::register::RegisterParams;
 use puffer_core::scans::PoseSigma;
@@ -36,7 +36,7 @@ impl ScanParams {
 
 puffer_core::param_groups! {
     /// All parameters of the registrar.
-    pub struct Params {
+    pub struct RegistrarParams {
         /// Which points count.
         scan: ScanParams,
         /// How scans are registered.

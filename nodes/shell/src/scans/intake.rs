@@ -1,16 +1,15 @@
-//! All scans that came, registered: the whole of the node without ROS's topics, so that a bag goes the same way.
+//! All scans that came, registered.
 
-use crate::Params;
-use crate::observation::Observation;
+use super::{Observation, RegistrarParams};
+use crate::Stamp;
 use puffer_core::geometry::{Pose, Scan};
 use puffer_core::register::{PreparedScan, Registrar, Registration, Status, Verdict};
 use puffer_core::scans::View;
 use puffer_core::{Progress, Result};
-use puffer_shell::Stamp;
 
 /// Registers observations in the order in which they come.
 pub struct Intake {
-    params: Params,
+    params: RegistrarParams,
     registrar: Registrar,
     entries: Vec<Entry>,
 }
@@ -49,7 +48,7 @@ impl Registered<'_> {
 
 impl Intake {
     /// Without scans.
-    pub fn new(params: Params) -> Intake {
+    pub fn new(params: RegistrarParams) -> Intake {
         let registrar = Registrar::new(params.scan.pose_sigma(), params.register.clone());
         Intake { params, registrar, entries: Vec::new() }
     }

@@ -1,12 +1,12 @@
 //! From a cloud and the transforms to what the sensor saw of the object.
 
-use crate::ScanParams;
+use super::ScanParams;
+use crate::convert::scan_from_message;
+use crate::{Stamp, TfBuffer};
 use nalgebra::Point3;
 use puffer_core::geometry::{Pose, Scan, Shape, Vec3};
 use puffer_core::robot::{BodyFilter, RobotModel};
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
-use puffer_shell::convert::scan_from_message;
-use puffer_shell::{Stamp, TfBuffer};
 
 /// How many standard deviations of the robot's pose are added to the margin before a scan is registered.
 const CAUTION: f64 = 2.0;
@@ -61,22 +61,22 @@ impl Observation {
     }
 
     /// In place of a scan that cannot be used.
-    pub(crate) fn nothing(stamp: Stamp) -> Observation {
+    pub(super) fn nothing(stamp: Stamp) -> Observation {
         let (scan, prior, bodies) = (Scan::default(), Pose::identity(), Vec::new());
         Observation { stamp, scan, prior, bodies }
     }
 
     /// The points that surely are not on a body while the pose is only what the robot says.
-    pub(crate) fn before_registration(&self, params: &ScanParams) -> Scan {
+    pub(super) fn before_registration(&self, params: &ScanParams) -> Scan {
         let sigma = params.pose_sigma();
         let distance = self.prior.translation.vector.norm();
-        let margin = params.body_margin
-            + CAUTION * sigma.translation.hypot(sigma.rotation * distance);
+        let margin =
+            params.body_margin + CAUTION * sigma.translation.hypot(sigma.rotation * distance);
         self.cut(&self.prior, margin)
     }
 
     /// The points that are not on a body when the sensor stood at `object_from_sensor`.
-    pub(crate) fn at(&self, object_from_sensor: &Pose, params: &ScanParams) -> Scan {
+    pub(super) fn at(&self, object_from_sensor: &Pose, params: &ScanParams) -> Scan {
         self.cut(object_from_sensor, params.body_margin)
     }
 
