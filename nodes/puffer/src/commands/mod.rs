@@ -1,5 +1,6 @@
 //! The commands of `puffer`.
 
+mod bench;
 mod doctor;
 mod evaluate;
 mod filter;
@@ -33,6 +34,8 @@ pub enum Command {
     Objects(objects::Objects),
     /// List the parameters with their defaults, ranges and units
     Params(params::Params),
+    /// Measure a part on this machine
+    Bench(bench::Bench),
     /// Check this machine
     Doctor(doctor::Doctor),
 }
@@ -52,6 +55,7 @@ impl Command {
             Command::Render(command) => command.run(),
             Command::Objects(command) => command.run(),
             Command::Params(command) => command.run(),
+            Command::Bench(command) => command.run(),
             Command::Doctor(command) => command.run(),
         }
     }
