@@ -1,5 +1,13 @@
 //! Transforms between frames over time.
 
+mod buffer;
+mod samples;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+pub use buffer::TfBuffer;
+
 use crate::Stamp;
 use anyhow::{Result, bail};
 use puffer_core::geometry::Pose;
@@ -75,66 +83,6 @@ pub enum TfError {
         /// Why not.
         reason: Box<TfError>,
     },
-}
-
-/// Transforms of the last seconds; clones share it. Needs no node: a bag's transforms may be inserted.
-#[derive(Clone, Debug, Default)]
-pub struct TfBuffer {}
-
-impl TfBuffer {
-    /// A buffer that keeps the last `window` of stamps for each pair of frames.
-    pub fn new(window: Duration) -> Self {
-        let _ = window;
-        Self {}
-    }
-
-    /// Adds a transform; a static one holds for all times.
-    pub fn insert(&self, transform: Transform, is_static: bool) {
-        let _ = (transform, is_static);
-    }
-
-    /// `target_from_source` at `stamp`: a sample itself where one has that stamp, else between its neighbours
-    /// (linear, and spherical linear for the rotation).
-    ///
-    /// # Errors
-    /// See [`TfError`].
-    pub fn lookup(
-        &self,
-        target: &str,
-        source: &str,
-        stamp: Stamp,
-    ) -> std::result::Result<Pose, TfError> {
-        let _ = (target, stamp);
-        Err(TfError::UnknownFrame { frame: source.to_owned(), known: String::new() })
-    }
-
-    /// `target_from_source` at the newest stamp at which it is known, with that stamp.
-    ///
-    /// # Errors
-    /// See [`TfError`].
-    pub fn latest(
-        &self,
-        target: &str,
-        source: &str,
-    ) -> std::result::Result<(Pose, Stamp), TfError> {
-        let _ = target;
-        Err(TfError::UnknownFrame { frame: source.to_owned(), known: String::new() })
-    }
-
-    /// As [`TfBuffer::lookup`], but waits until the transform is known.
-    ///
-    /// # Errors
-    /// [`TfError::Deadline`] after `deadline` of wall time.
-    pub async fn wait(
-        &self,
-        target: &str,
-        source: &str,
-        stamp: Stamp,
-        deadline: Duration,
-    ) -> std::result::Result<Pose, TfError> {
-        let _ = deadline;
-        self.lookup(target, source, stamp)
-    }
 }
 
 /// Publishes transforms.
