@@ -4,8 +4,11 @@ use puffer_msgs_generator::{Package, generate};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// A package for tests only.
+const KINDS: &str = "tests/kinds";
+
 fn main() -> ExitCode {
-    for folder in ["msg", "srv", "action", "standard"] {
+    for folder in ["msg", "srv", "action", "standard", KINDS] {
         println!("cargo::rerun-if-changed={folder}");
     }
     match write() {
@@ -19,9 +22,15 @@ fn main() -> ExitCode {
 
 fn write() -> Result<(), String> {
     let out = std::env::var("OUT_DIR").map_err(|e| format!("OUT_DIR: {e}; build with cargo"))?;
-    let code = generate(&packages()?, "puffer_msgs").map_err(|e| e.to_string())?;
-    let file = Path::new(&out).join("interfaces.rs");
-    std::fs::write(&file, code).map_err(|e| format!("cannot write {}: {e}", file.display()))
+    let mut packages = packages()?;
+    write_code(&packages, &Path::new(&out).join("interfaces.rs"))?;
+    packages.push(Package { name: "kinds".into(), folder: KINDS.into() });
+    write_code(&packages, &Path::new(&out).join("interfaces_and_kinds.rs"))
+}
+
+fn write_code(packages: &[Package], file: &Path) -> Result<(), String> {
+    let code = generate(packages, "puffer_msgs").map_err(|e| e.to_string())?;
+    std::fs::write(file, code).map_err(|e| format!("cannot write {}: {e}", file.display()))
 }
 
 /// This package, and each folder of `standard`.

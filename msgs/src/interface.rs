@@ -58,6 +58,12 @@ pub trait Action: Send + Sync + 'static {
     type GetResult: Service<Request = GetResultRequest, Response = GetResultResponse<Self::Result>>;
 }
 
+/// Does something with each type of this crate; see [`visit_types`](crate::visit_types).
+pub trait TypeVisitor {
+    /// Is shown the type `T`.
+    fn visit<T: Interface>(&mut self);
+}
+
 /// A goal and the number that its client gave it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalRequest<G> {

@@ -6,16 +6,21 @@
 
 pub mod cdr;
 mod interface;
+#[cfg(test)]
+mod tests;
 mod time;
 #[doc(hidden)]
 pub mod wire;
 
 pub use interface::{
     Action, FeedbackMessage, GetResultRequest, GetResultResponse, Interface, SendGoalRequest,
-    SendGoalResponse, Service,
+    SendGoalResponse, Service, TypeVisitor,
 };
 
+#[cfg(not(test))]
 include!(concat!(env!("OUT_DIR"), "/interfaces.rs"));
+#[cfg(test)]
+include!(concat!(env!("OUT_DIR"), "/interfaces_and_kinds.rs"));
 
 /// Name (`sensor_msgs/msg/PointCloud2`) and full definition (`ros2msg` text, with those of all types inside) of each
 /// message, request, response, goal, result, feedback and feedback message, sorted by name.

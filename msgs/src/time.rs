@@ -14,9 +14,12 @@ fn split(nanoseconds: i64) -> (i32, u32) {
     }
 }
 
-/// Seconds as whole nanoseconds; what is too large is cut off, NaN is 0.
+/// Seconds as whole nanoseconds; what is too large is cut off, NaN is 0. The product of a present-day stamp and a
+/// billion would lose 100 ns, so whole seconds go apart.
 fn nanoseconds_of(seconds: f64) -> i64 {
-    (seconds * BILLION as f64).round() as i64
+    let whole = seconds.floor();
+    let rest = ((seconds - whole) * BILLION as f64).round() as i64;
+    (whole as i64).saturating_mul(BILLION).saturating_add(rest)
 }
 
 impl Time {

@@ -1,6 +1,6 @@
 //! Rust types from ROS 2 interface files (.msg, .srv, .action), made by a build script.
 //!
-//! The generated code expects in the root of its crate: the traits `Interface`, `Service` and `Action`, the types
+//! The generated code expects in the root of its crate: the traits `Interface`, `Service`, `Action` and `TypeVisitor`, the types
 //! `SendGoalRequest`, `SendGoalResponse`, `GetResultRequest`, `GetResultResponse` and `FeedbackMessage`, and the module
 //! `wire` with the serde functions of long arrays and bounded fields.
 
@@ -10,6 +10,8 @@ mod error;
 mod literal;
 mod model;
 mod parse;
+#[cfg(test)]
+mod tests;
 mod tree;
 mod types;
 

@@ -243,11 +243,15 @@ fn table(tree: &Tree, own: &str) -> String {
     }
     types.sort();
     let mut out = format!("static DEFINITIONS: [(&str, &str); {}] = [\n", types.len());
-    for (_, path) in types {
-        out.push_str(&format!(
-            "    (<{path} as crate::Interface>::TYPE_NAME, <{path} as crate::Interface>::DEFINITION),\n"
-        ));
+    for (_, path) in &types {
+        let known = format!("<{path} as crate::Interface>");
+        out.push_str(&format!("    ({known}::TYPE_NAME, {known}::DEFINITION),\n"));
     }
-    out.push_str("];\n");
+    out.push_str("];\n\n/// Shows all types to the visitor, sorted by name.\n");
+    out.push_str("pub fn visit_types(visitor: &mut impl crate::TypeVisitor) {\n");
+    for (_, path) in &types {
+        out.push_str(&format!("    visitor.visit::<{path}>();\n"));
+    }
+    out.push_str("}\n");
     out
 }

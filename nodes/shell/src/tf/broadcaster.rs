@@ -1,12 +1,13 @@
 //! Transforms on `/tf` and `/tf_static`.
 
 use super::{TfBuffer, Transform};
+use crate::convert::transform_message;
 use crate::dds::Dds;
-use crate::{Profile, Publisher, Stamp, Stop, Subscription, qos};
+use crate::{Profile, Publisher, Stop, Subscription, qos};
 use anyhow::Result;
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use puffer_core::geometry::Pose;
+use puffer_msgs::builtin_interfaces::msg::Time;
 use puffer_msgs::geometry_msgs::msg::TransformStamped;
+use puffer_msgs::std_msgs::msg::Header;
 use puffer_msgs::tf2_msgs::msg::TFMessage;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -79,55 +80,17 @@ pub(crate) fn subscribe(
 
 async fn fill(mut messages: Subscription<TFMessage>, buffer: TfBuffer, is_static: bool) {
     while let Some(message) = messages.next().await {
-        for transform in &message.transforms {
-            match from_ros(transform) {
-                Ok(transform) => buffer.insert(transform, is_static),
-                Err(error) => tracing::warn!("{}: transform ignored: {error}", messages.topic()),
-            }
+        if let Err(reason) = buffer.insert_message(&message, is_static) {
+            tracing::warn!("a transform on {} is left out: {reason}", messages.topic());
         }
     }
 }
 
 fn to_ros(transform: &Transform) -> TransformStamped {
-    let mut ros = TransformStamped::default();
-    ros.header.stamp = transform.stamp.into();
-    ros.header.frame_id.clone_from(&transform.parent);
-    ros.child_frame_id.clone_from(&transform.child);
-    let (t, q) = (&transform.pose.translation, &transform.pose.rotation);
-    (ros.transform.translation.x, ros.transform.translation.y, ros.transform.translation.z) =
-        (t.x, t.y, t.z);
-    let rotation = &mut ros.transform.rotation;
-    (rotation.x, rotation.y, rotation.z, rotation.w) = (q.i, q.j, q.k, q.w);
-    ros
-}
-
-/// The transform, if its numbers are finite and its rotation is of length 1 to one part in a thousand.
-pub(crate) fn from_ros(ros: &TransformStamped) -> Result<Transform, String> {
-    let (t, q) = (&ros.transform.translation, &ros.transform.rotation);
-    let quaternion = Quaternion::new(q.w, q.x, q.y, q.z);
-    let length = quaternion.norm();
-    let finite = [t.x, t.y, t.z, length].iter().all(|number| number.is_finite());
-    let (parent, child) = (&ros.header.frame_id, &ros.child_frame_id);
-    if !finite || (length - 1.0).abs() > 1e-3 {
-        return Err(format!(
-            "{parent} <- {child}: its rotation has length {length:.4}, or a number is not finite"
-        ));
+    let (sec, nanosec) = transform.stamp.parts();
+    TransformStamped {
+        header: Header { stamp: Time { sec, nanosec }, frame_id: transform.parent.clone() },
+        child_frame_id: transform.child.clone(),
+        transform: transform_message(&transform.pose),
     }
-    if parent == child || parent.is_empty() || child.is_empty() {
-        return Err(format!("`{parent}` <- `{child}`: two different frames are needed"));
-    }
-    Ok(Transform {
-        parent: parent.clone(),
-        child: child.clone(),
-        stamp: Stamp::from(ros.header.stamp),
-        pose: Pose::from_parts(
-            Translation3::new(t.x, t.y, t.z),
-            // Bits that came in stay as they are where they are a unit quaternion already.
-            if (length - 1.0).abs() < 1e-12 {
-                UnitQuaternion::new_unchecked(quaternion)
-            } else {
-                UnitQuaternion::new_normalize(quaternion)
-            },
-        ),
-    })
 }

@@ -1,19 +1,22 @@
-//! A tree of frames over time.
+//! Transforms of the last seconds, and what lies between them.
 
+use super::tree::Tree;
 use super::{TfError, Transform};
 use crate::Stamp;
+use crate::convert::pose_from_transform;
 use puffer_core::geometry::Pose;
-use std::collections::BTreeMap;
+use puffer_msgs::tf2_msgs::msg::TFMessage;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use tokio::sync::watch;
+use tokio::sync::Notify;
 
-/// Stamps kept for each link where nothing else is asked.
+/// As long as tf2 keeps transforms.
 const WINDOW: Duration = Duration::from_secs(10);
-/// Longer chains are taken for a loop.
-const DEPTH: usize = 1000;
 
 /// Transforms of the last seconds; clones share it. Needs no node: a bag's transforms may be inserted.
+///
+/// A frame may change its parent: each transform counts with the parent that it names. A slash before a frame's name is
+/// left out.
 #[derive(Clone, Debug)]
 pub struct TfBuffer {
     shared: Arc<Shared>,
@@ -21,117 +24,81 @@ pub struct TfBuffer {
 
 #[derive(Debug)]
 struct Shared {
+    tree: Mutex<Tree>,
+    changed: Notify,
     window: Duration,
-    links: Mutex<BTreeMap<String, Link>>,
-    changed: watch::Sender<u64>,
-}
-
-/// How a frame hangs on its parent.
-#[derive(Debug)]
-struct Link {
-    parent: String,
-    /// `parent_from_child`; one only, for all times, if static.
-    samples: BTreeMap<Stamp, Pose>,
-    is_static: bool,
 }
 
 impl Default for TfBuffer {
-    /// Keeps 10 s of stamps.
+    /// Keeps 10 s.
     fn default() -> Self {
         Self::new(WINDOW)
     }
 }
 
-type Links = BTreeMap<String, Link>;
-
 impl TfBuffer {
-    /// A buffer that keeps the last `window` of stamps for each frame.
+    /// A buffer that keeps the last `window` of stamps for each frame; `Duration::MAX` keeps all.
     pub fn new(window: Duration) -> Self {
-        let changed = watch::Sender::new(0);
-        Self { shared: Arc::new(Shared { window, links: Mutex::default(), changed }) }
+        let (tree, changed) = (Mutex::default(), Notify::new());
+        Self { shared: Arc::new(Shared { tree, changed, window }) }
     }
 
-    fn links(&self) -> MutexGuard<'_, Links> {
-        self.shared.links.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Adds a transform; a static one holds for all times. A frame whose parent changes forgets its past. What
-    /// is older than the window is left out.
+    /// Adds a transform; a static one holds for all times. Of two with the same child and stamp the later one counts.
+    /// A stamp that lies more than the window before the frame's newest one means that time began anew: the frame's
+    /// earlier transforms are forgotten.
     pub fn insert(&self, transform: Transform, is_static: bool) {
-        let Transform { parent, child, stamp, pose } = transform;
-        {
-            let mut links = self.links();
-            let link = links.entry(name_of(&child).to_owned()).or_insert_with(|| Link {
-                parent: String::new(),
-                samples: BTreeMap::new(),
-                is_static,
-            });
-            if link.parent != name_of(&parent) || is_static || link.is_static {
-                link.samples.clear();
-                link.is_static = is_static;
-                name_of(&parent).clone_into(&mut link.parent);
-            }
-            link.samples.insert(stamp, pose);
-            if let Some(newest) = link.samples.last_key_value().map(|(stamp, _)| *stamp) {
-                link.samples = link.samples.split_off(&(newest - self.shared.window));
+        self.tree().insert(named(transform), is_static, self.shared.window);
+        self.shared.changed.notify_waiters();
+    }
+
+    /// Adds the transforms of a message, as [`TfBuffer::insert`] does.
+    ///
+    /// # Errors
+    /// A transform that is no rigid one, or whose frames are the same or without a name, in words; the others of
+    /// the message are added all the same.
+    pub fn insert_message(&self, message: &TFMessage, is_static: bool) -> Result<(), String> {
+        let mut faults = Vec::new();
+        for transform in &message.transforms {
+            let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
+            let stamp = Stamp::new(transform.header.stamp.sec, transform.header.stamp.nanosec);
+            let checked = checked_names(parent, child)
+                .and_then(|()| pose_from_transform(&transform.transform));
+            match checked {
+                Ok(pose) => {
+                    let (parent, child) = (parent.clone(), child.clone());
+                    self.insert(Transform { parent, child, stamp, pose }, is_static);
+                }
+                Err(fault) => faults.push(format!("transform {parent} <- {child}: {fault}")),
             }
         }
-        self.shared.changed.send_modify(|count| *count += 1);
-    }
-
-    /// Forgets everything, as when simulated time starts again.
-    pub fn clear(&self) {
-        self.links().clear();
-        self.shared.changed.send_modify(|count| *count += 1);
+        if faults.is_empty() { Ok(()) } else { Err(faults.join("; ")) }
     }
 
     /// `target_from_source` at `stamp`: a sample itself where one has that stamp, else between its neighbours
-    /// (linear, and spherical linear for the rotation). Nothing is extrapolated.
+    /// (linear, and spherical linear for the rotation).
     ///
     /// # Errors
     /// See [`TfError`].
     pub fn lookup(&self, target: &str, source: &str, stamp: Stamp) -> Result<Pose, TfError> {
-        let (target, source) = (name_of(target), name_of(source));
-        let links = self.links();
-        let (target_chain, source_chain) = (chain(&links, target)?, chain(&links, source)?);
-        let common = common(&target_chain, &source_chain)?;
-        let common_from_target = compose(&links, &target_chain, common, stamp)?;
-        let common_from_source = compose(&links, &source_chain, common, stamp)?;
-        Ok(match common_from_target {
-            None => common_from_source.unwrap_or_else(Pose::identity),
-            Some(target) => match common_from_source {
-                None => target.inverse(),
-                Some(source) => target.inverse() * source,
-            },
-        })
+        self.tree().lookup(bare(target), bare(source), stamp)
     }
 
-    /// `target_from_source` at the newest stamp at which it is known, with that stamp ([`Stamp::ZERO`] where all
-    /// links are static).
+    /// `target_from_source` at the newest stamp at which it is known, with that stamp; with stamp 0 where only static
+    /// transforms lie between the frames.
     ///
     /// # Errors
     /// See [`TfError`].
     pub fn latest(&self, target: &str, source: &str) -> Result<(Pose, Stamp), TfError> {
-        let stamp = {
-            let links = self.links();
-            let chains = [chain(&links, name_of(target))?, chain(&links, name_of(source))?];
-            let common = common(&chains[0], &chains[1])?;
-            let moving = chains
-                .iter()
-                .flat_map(|chain| chain.iter().take_while(|frame| **frame != common))
-                .filter_map(|frame| links.get(*frame).filter(|link| !link.is_static));
-            moving
-                .filter_map(|link| link.samples.last_key_value().map(|(stamp, _)| *stamp))
-                .min()
-                .unwrap_or_default()
-        };
-        Ok((self.lookup(target, source, stamp)?, stamp))
+        let (target, source) = (bare(target), bare(source));
+        let tree = self.tree();
+        let stamp = tree.newest(target, source)?;
+        Ok((tree.lookup(target, source, stamp)?, stamp))
     }
 
     /// As [`TfBuffer::lookup`], but waits until the transform is known.
     ///
     /// # Errors
-    /// [`TfError::Deadline`] after `deadline` of wall time; at once if the stamp is older than what is kept.
+    /// [`TfError::Deadline`] after `deadline` of wall time.
     pub async fn wait(
         &self,
         target: &str,
@@ -139,131 +106,50 @@ impl TfBuffer {
         stamp: Stamp,
         deadline: Duration,
     ) -> Result<Pose, TfError> {
-        let until = tokio::time::Instant::now() + deadline;
-        let mut changes = self.shared.changed.subscribe();
+        let sleep = tokio::time::sleep(deadline);
+        tokio::pin!(sleep);
         loop {
-            changes.borrow_and_update();
+            let changed = self.shared.changed.notified();
+            tokio::pin!(changed);
+            // From here on no insertion is missed.
+            changed.as_mut().enable();
             let reason = match self.lookup(target, source, stamp) {
                 Ok(pose) => return Ok(pose),
-                Err(reason) => reason,
+                Err(reason) => Box::new(reason),
             };
-            if let TfError::OutOfRange { oldest, .. } = &reason
-                && stamp < *oldest
-            {
-                return Err(reason);
-            }
-            if tokio::time::timeout_at(until, changes.changed()).await.is_err() {
-                return Err(TfError::Deadline {
-                    target_frame: target.to_owned(),
-                    source_frame: source.to_owned(),
-                    deadline,
-                    reason: Box::new(reason),
-                });
+            tokio::select! {
+                () = changed => {}
+                () = &mut sleep => {
+                    let (target_frame, source_frame) = (bare(target).into(), bare(source).into());
+                    return Err(TfError::Deadline { target_frame, source_frame, deadline, reason });
+                }
             }
         }
     }
+
+    fn tree(&self) -> MutexGuard<'_, Tree> {
+        // A tree is whole after each insertion, also where a thread died.
+        self.shared.tree.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
-/// tf2 forbids a leading slash, tf had it.
-fn name_of(frame: &str) -> &str {
+fn bare(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
 }
 
-/// The frame and all above it.
-fn chain<'a>(links: &'a Links, frame: &'a str) -> Result<Vec<&'a str>, TfError> {
-    let known = links.contains_key(frame) || links.values().any(|link| link.parent == frame);
-    if !known {
-        let mut all: Vec<_> =
-            links.iter().flat_map(|(child, link)| [child.as_str(), link.parent.as_str()]).collect();
-        all.sort_unstable();
-        all.dedup();
-        let known = if all.is_empty() { "none".to_owned() } else { all.join(", ") };
-        return Err(TfError::UnknownFrame { frame: frame.to_owned(), known });
-    }
-    let mut chain = vec![frame];
-    while let Some(link) = chain.last().and_then(|last| links.get(*last)) {
-        if chain.len() > DEPTH || chain.contains(&link.parent.as_str()) {
-            return Err(TfError::Loop { frame: frame.to_owned(), parent: link.parent.clone() });
+fn named(mut transform: Transform) -> Transform {
+    for name in [&mut transform.parent, &mut transform.child] {
+        if name.starts_with('/') {
+            name.remove(0);
         }
-        chain.push(&link.parent);
     }
-    Ok(chain)
+    transform
 }
 
-fn common<'a>(target: &[&'a str], source: &[&'a str]) -> Result<&'a str, TfError> {
-    target.iter().find(|frame| source.contains(frame)).copied().ok_or_else(|| {
-        let first = |chain: &[&str]| chain.first().copied().unwrap_or_default().to_owned();
-        let last = |chain: &[&str]| chain.last().copied().unwrap_or_default().to_owned();
-        TfError::NotConnected {
-            target_frame: first(target),
-            source_frame: first(source),
-            target_root: last(target),
-            source_root: last(source),
-        }
-    })
-}
-
-/// `ancestor_from_first`; `None` if they are the same frame, so that one link alone is not multiplied by an identity.
-fn compose(
-    links: &Links,
-    chain: &[&str],
-    ancestor: &str,
-    stamp: Stamp,
-) -> Result<Option<Pose>, TfError> {
-    let mut pose: Option<Pose> = None;
-    for frame in chain.iter().take_while(|frame| **frame != ancestor) {
-        if let Some(link) = links.get(*frame) {
-            let step = link.at(frame, stamp)?;
-            pose = Some(pose.map_or(step, |below| step * below));
-        }
+fn checked_names(parent: &str, child: &str) -> Result<(), String> {
+    match (bare(parent), bare(child)) {
+        ("", _) | (_, "") => Err("a frame has no name".into()),
+        (parent, child) if parent == child => Err("a frame is its own parent".into()),
+        _ => Ok(()),
     }
-    Ok(pose)
-}
-
-impl Link {
-    fn at(&self, child: &str, stamp: Stamp) -> Result<Pose, TfError> {
-        if let Some(pose) = self.samples.get(&stamp) {
-            return Ok(*pose);
-        }
-        let before = self.samples.range(..stamp).next_back();
-        let after = self.samples.range(stamp..).next();
-        match (before, after) {
-            (Some((_, pose)), _) | (_, Some((_, pose))) if self.is_static => Ok(*pose),
-            (Some((from, a)), Some((to, b))) => {
-                let share = stamp.seconds_since(*from) / to.seconds_since(*from);
-                Ok(between(a, b, share))
-            }
-            _ => Err(self.out_of_range(child, stamp)),
-        }
-    }
-
-    fn out_of_range(&self, child: &str, stamp: Stamp) -> TfError {
-        let oldest = self.samples.first_key_value().map(|(at, _)| *at).unwrap_or_default();
-        let newest = self.samples.last_key_value().map(|(at, _)| *at).unwrap_or_default();
-        let outside = if stamp < oldest {
-            format!("{:.3} s before the oldest", oldest.seconds_since(stamp))
-        } else {
-            format!("{:.3} s after the newest", stamp.seconds_since(newest))
-        };
-        TfError::OutOfRange {
-            parent: self.parent.clone(),
-            child: child.to_owned(),
-            stamp,
-            outside,
-            count: self.samples.len(),
-            oldest,
-            newest,
-        }
-    }
-}
-
-fn between(a: &Pose, b: &Pose, share: f64) -> Pose {
-    let translation = a.translation.vector.lerp(&b.translation.vector, share);
-    // Opposite rotations have no shortest way between them; then the nearer one.
-    let rotation = a.rotation.try_slerp(&b.rotation, share, 1e-12).unwrap_or(if share < 0.5 {
-        a.rotation
-    } else {
-        b.rotation
-    });
-    Pose::from_parts(translation.into(), rotation)
 }

@@ -2,13 +2,13 @@
 
 mod broadcaster;
 mod buffer;
+mod samples;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 use crate::Stamp;
 pub use broadcaster::TfBroadcaster;
-#[cfg(test)]
-use broadcaster::from_ros;
 pub(crate) use broadcaster::subscribe;
 pub use buffer::TfBuffer;
 use puffer_core::geometry::Pose;
