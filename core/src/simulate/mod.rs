@@ -5,6 +5,7 @@
 //! and the one that the robot reports. All chance comes from the seed, the view and the row, so that results
 //! depend neither on the threads nor on the order of the views.
 
+mod cell;
 mod laser;
 mod noise;
 pub mod objects;
@@ -13,6 +14,7 @@ mod scene;
 mod stereo;
 mod views;
 
+pub use cell::{Cell, sensor_of};
 pub use noise::{FLYING, GOOD, NoiseFamily, OUTLIER, SURROUNDINGS};
 pub use views::view_poses;
 

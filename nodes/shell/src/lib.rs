@@ -28,6 +28,7 @@ mod names;
 mod node;
 mod params;
 mod qos;
+pub mod scans;
 mod service;
 mod stamp;
 mod stop;
