@@ -35,4 +35,10 @@ impl Clock {
     pub fn set(&self, time: Stamp) {
         self.time.send_replace(time);
     }
+
+    /// Resolves when simulated time has reached `stamp`.
+    pub async fn reached(&self, stamp: Stamp) {
+        // Fails only without a sender, and `self` holds one.
+        let _ = self.time.subscribe().wait_for(|time| *time >= stamp).await;
+    }
 }

@@ -4,14 +4,14 @@ use crate::bulk::{BulkPublisher, BulkSubscription, Delivery, Mode};
 use crate::clock::Clock;
 use crate::dds::Dds;
 use crate::names::Names;
-use crate::parameters::{self, Store};
+use crate::params::{self, Store};
 use crate::service::{Server, answer_all};
 use crate::{
     Action, ActionClient, Client, Diagnostics, Goal, Interface, Outcome, Profile, Publisher,
     RosArgs, Service, ServiceMapping, Stamp, Stop, Subscription, TfBroadcaster, TfBuffer, action,
     logging, qos, tf,
 };
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use puffer_core::params::Parameters;
 use puffer_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use puffer_msgs::rcl_interfaces::msg::Log;
@@ -20,6 +20,7 @@ use rustdds::policy::Durability;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+use tokio::sync::watch;
 
 const DIAGNOSTICS_PERIOD: Duration = Duration::from_secs(1);
 /// Stamps that the transforms of a node reach back.
@@ -68,7 +69,7 @@ impl<P: Parameters> Node<P> {
         let names = Names::new(default_name, &args.namespace, &args.remaps)?;
         let full = names.full();
         let clock = Clock::new();
-        let params = Arc::new(Store::new(&full, &args.settings, clock.clone())?);
+        let params = Arc::new(Store::new(&full, &args.settings)?);
         let stop = stop.child();
         let (lines, queue) = unbounded_channel();
         let log_clock = clock.clone();
@@ -111,12 +112,14 @@ impl<P: Parameters> Node<P> {
             inner.clock.clone(),
             inner.stop.clone(),
         ));
+        let simulated = inner.params.watch_sim_time();
+        inner.clock.simulate(*simulated.borrow());
         let topic = self.resolve("/clock")?;
         let time = Subscription::new(&inner.dds, &topic, &qos::clock(), inner.stop.clone())?;
-        tokio::spawn(follow(time, inner.clock.clone()));
+        tokio::spawn(follow(time, simulated, inner.clock.clone()));
         let volatile = qos::events(Durability::Volatile);
         let events = Publisher::new(&inner.dds, &self.resolve("/parameter_events")?, &volatile)?;
-        parameters::serve(self, &inner.params, events)
+        params::serve(self, &inner.params, inner.clock.clone(), events)
     }
 
     fn resolve(&self, name: &str) -> Result<String> {
@@ -125,12 +128,17 @@ impl<P: Parameters> Node<P> {
 
     /// The parameters as they are now.
     pub fn params(&self) -> P {
-        self.inner.params.get()
+        self.inner.params.params()
     }
 
     /// Resolves when parameters have changed since `seen`, with their new values.
     pub async fn params_changed(&self, seen: &P) -> P {
         self.inner.params.changed(seen).await
+    }
+
+    /// Lets nobody change these parameters (`group.field`) from now on.
+    pub fn protect_params(&self, names: &[&str]) {
+        self.inner.params.protect(names);
     }
 
     /// The node's name.
@@ -161,6 +169,38 @@ impl<P: Parameters> Node<P> {
     /// Now: simulated time with `use_sim_time` (0 before the first `/clock`), else the system's.
     pub fn now(&self) -> Stamp {
         self.inner.clock.now()
+    }
+
+    /// Waits until [`Node::now`] has reached `stamp`.
+    ///
+    /// # Errors
+    /// It has not within `deadline` (wall time).
+    pub async fn wait_until(&self, stamp: Stamp, deadline: Duration) -> Result<()> {
+        let clock = &self.inner.clock;
+        let reached = async {
+            if clock.is_simulated() {
+                clock.reached(stamp).await;
+            } else {
+                let left = stamp.seconds_since(clock.now()).max(0.0);
+                tokio::time::sleep(Duration::from_secs_f64(left)).await;
+            }
+        };
+        tokio::time::timeout(deadline, reached).await.map_err(|_| {
+            let source = if clock.is_simulated() { "/clock" } else { "the system's clock" };
+            anyhow!(
+                "{source} has not reached {stamp} within {:.1} s; it is at {}",
+                deadline.as_secs_f64(),
+                clock.now()
+            )
+        })
+    }
+
+    /// Waits until the time is known: at once without `use_sim_time`, else for the first `/clock`.
+    ///
+    /// # Errors
+    /// Nobody has told the time within `deadline` (wall time).
+    pub async fn wait_for_clock(&self, deadline: Duration) -> Result<()> {
+        self.wait_until(Stamp::from_nanos(1), deadline).await
     }
 
     /// Whether time comes from `/clock`.
@@ -341,8 +381,21 @@ async fn diagnose(
     }
 }
 
-async fn follow(mut time: Subscription<msg::Clock>, clock: Clock) {
-    while let Some(message) = time.next().await {
-        clock.set(message.clock.into());
+async fn follow(
+    mut messages: Subscription<msg::Clock>,
+    mut simulated: watch::Receiver<bool>,
+    clock: Clock,
+) {
+    loop {
+        tokio::select! {
+            message = messages.next() => match message {
+                Some(message) => clock.set(message.clock.into()),
+                None => return,
+            },
+            changed = simulated.changed() => match changed {
+                Ok(()) => clock.simulate(*simulated.borrow()),
+                Err(_) => return,
+            },
+        }
     }
 }

@@ -155,7 +155,7 @@ impl<A: Action> GoalHandle<A> {
             Ok(Ok(end)) => end.clone(),
             Ok(Err(_)) => None,
             Err(_) => {
-                return Err(CallError::NoAnswer { service: service(), attempts: 1, deadline });
+                return Err(CallError::NoResult { action: self.inner.name.clone(), deadline });
             }
         };
         let answer = end.unwrap_or_else(|| Err(CallError::Stopped { service: service() }))?;

@@ -41,6 +41,10 @@ impl<A: Action> Goal<A> {
         Self { shared: Arc::new(Shared { id, goal, cancel, feedback }) }
     }
 
+    pub(super) fn flag(&self) -> Stop {
+        self.shared.cancel.clone()
+    }
+
     /// What the client asks for.
     pub fn request(&self) -> &A::Goal {
         &self.shared.goal

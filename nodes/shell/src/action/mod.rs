@@ -3,6 +3,7 @@
 
 mod client;
 mod goal;
+mod goals;
 mod server;
 
 use crate::clock::Clock;

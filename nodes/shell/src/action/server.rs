@@ -1,22 +1,20 @@
 //! The serving end of an action.
 
 use super::goal::{Goal, Outcome};
+use super::goals::{Answer, Goals};
 use super::{GoalId, Place, feedback_topic};
 use crate::clock::Clock;
 use crate::dds::Writer;
-use crate::service::{Server, answer_all};
+use crate::service::{Call, Server, answer_all};
 use crate::{Publisher, Stamp, Stop, qos};
 use anyhow::Result;
-use puffer_msgs::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
+use puffer_msgs::action_msgs::msg::{GoalStatus, GoalStatusArray};
 use puffer_msgs::action_msgs::srv::{CancelGoal, CancelGoalRequest, CancelGoalResponse};
 use puffer_msgs::unique_identifier_msgs::msg::UUID;
 use puffer_msgs::{Action, GetResultResponse, SendGoalRequest, SendGoalResponse};
 use rustdds::policy::Durability;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use tokio::sync::watch;
 
-/// Goals that have ended and whose results are kept.
-const ENDED_KEPT: usize = 32;
 const FEEDBACK_DEPTH: i32 = 10;
 
 /// Makes the action's services and topics and answers them until the node stops.
@@ -33,7 +31,8 @@ where
     let latched = qos::build(true, Durability::TransientLocal, 1);
     let desk = Arc::new(Desk {
         name: place.name.to_owned(),
-        goals: Mutex::default(),
+        goals: Mutex::new(Goals::new()),
+        results: Server::new(dds, mapping, &place.part("get_result"))?,
         feedback: Arc::new(dds.writer(&topic, &kind, &feedback)?),
         status: Publisher::new(dds, &place.part("status"), &latched)?,
         clock: place.clock.clone(),
@@ -41,44 +40,26 @@ where
     });
     let send_goal = Server::<A::SendGoal>::new(dds, mapping, &place.part("send_goal"))?;
     let cancel_goal = Server::<CancelGoal>::new(dds, mapping, &place.part("cancel_goal"))?;
-    let get_result = Server::<A::GetResult>::new(dds, mapping, &place.part("get_result"))?;
     tokio::spawn(Arc::clone(&desk).take_goals(send_goal, accept, execute));
     let cancelling = Arc::clone(&desk);
     let cancel = move |request| std::future::ready(cancelling.cancel(&request));
     tokio::spawn(answer_all(cancel_goal, cancel, place.stop.clone()));
-    tokio::spawn(desk.give_results(Arc::new(get_result)));
+    tokio::spawn(desk.give_results());
     Ok(())
 }
 
 struct Desk<A: Action> {
     name: String,
-    goals: Mutex<Vec<Record<A>>>,
+    goals: Mutex<Goals<A::Result, Call>>,
+    results: Server<A::GetResult>,
     feedback: Arc<Writer>,
     status: Publisher<GoalStatusArray>,
     clock: Clock,
     stop: Stop,
 }
 
-struct Record<A: Action> {
-    id: GoalId,
-    stamp: Stamp,
-    status: i8,
-    cancel: Stop,
-    end: watch::Sender<Option<GetResultResponse<A::Result>>>,
-}
-
-impl<A: Action> Record<A> {
-    fn info(&self) -> GoalInfo {
-        GoalInfo { goal_id: UUID { uuid: self.id }, stamp: self.stamp.into() }
-    }
-
-    fn has_ended(&self) -> bool {
-        self.end.borrow().is_some()
-    }
-}
-
 impl<A: Action> Desk<A> {
-    fn goals(&self) -> MutexGuard<'_, Vec<Record<A>>> {
+    fn goals(&self) -> MutexGuard<'_, Goals<A::Result, Call>> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -94,7 +75,7 @@ impl<A: Action> Desk<A> {
     {
         while let Some((call, request)) = self.stop.or(server.receive()).await {
             let SendGoalRequest { goal_id: UUID { uuid: id }, goal } = request;
-            let verdict = if self.goals().iter().any(|record| record.id == id) {
+            let verdict = if self.goals().contains(id) {
                 Err("a goal of the same number was sent before".to_owned())
             } else {
                 accept(&goal)
@@ -110,40 +91,26 @@ impl<A: Action> Desk<A> {
             };
             server.answer(&call, &SendGoalResponse { accepted, stamp: stamp.into() }).await;
             if let Some(goal) = goal {
+                let cancel = goal.flag();
                 let work = execute(goal);
-                tokio::spawn(Arc::clone(&self).run(id, work));
+                tokio::spawn(Arc::clone(&self).run(id, cancel, work));
             }
         }
     }
 
     fn enter(&self, id: GoalId, goal: A::Goal, stamp: Stamp) -> Goal<A> {
         let cancel = self.stop.child();
-        let status = GoalStatus::STATUS_ACCEPTED;
-        let end = watch::Sender::new(None);
-        {
-            let mut goals = self.goals();
-            goals.push(Record { id, stamp, status, cancel: cancel.clone(), end });
-            let ended = goals.iter().filter(|record| record.has_ended()).count();
-            if ended > ENDED_KEPT
-                && let Some(oldest) = goals.iter().position(Record::has_ended)
-            {
-                goals.remove(oldest);
-            }
-        }
-        self.tell();
+        self.change(|goals| goals.accept(id, stamp, cancel.clone()));
         Goal::new(id, goal, cancel, Arc::clone(&self.feedback))
     }
 
     async fn run(
         self: Arc<Self>,
         id: GoalId,
+        cancel: Stop,
         work: impl Future<Output = Outcome<A::Result>> + Send + 'static,
     ) {
-        self.change(id, |record| {
-            if record.status == GoalStatus::STATUS_ACCEPTED {
-                record.status = GoalStatus::STATUS_EXECUTING;
-            }
-        });
+        self.change(|goals| goals.start(id));
         let outcome = tokio::spawn(work).await.unwrap_or_else(|error| {
             tracing::error!("{}: goal aborted: {error}", self.name);
             Outcome::Aborted(A::Result::default())
@@ -153,83 +120,35 @@ impl<A: Action> Desk<A> {
             Outcome::Aborted(result) => (GoalStatus::STATUS_ABORTED, result),
             Outcome::Canceled(result) => (GoalStatus::STATUS_CANCELED, result),
         };
-        self.change(id, |record| {
-            record.status = status;
-            record.end.send_replace(Some(GetResultResponse { status, result }));
-            // Ends the task behind the flag.
-            record.cancel.stop();
-        });
-    }
-
-    fn change(&self, id: GoalId, change: impl FnOnce(&mut Record<A>)) {
-        if let Some(record) = self.goals().iter_mut().find(|record| record.id == id) {
-            change(record);
+        // Ends the task behind the flag.
+        cancel.stop();
+        let response = GetResultResponse { status, result };
+        for call in self.change(|goals| goals.end(id, &response)) {
+            self.results.answer(&call, &response).await;
         }
-        self.tell();
     }
 
-    /// Publishes the status of all goals.
-    fn tell(&self) {
-        let goals = self.goals();
-        let status = |r: &Record<A>| GoalStatus { goal_info: r.info(), status: r.status };
-        let status_list = goals.iter().map(status).collect();
+    /// Changes the goals and publishes the status of all.
+    fn change<T>(&self, change: impl FnOnce(&mut Goals<A::Result, Call>) -> T) -> T {
+        let mut goals = self.goals();
+        let changed = change(&mut goals);
         // Locked while publishing: an older list must not come later.
-        if let Err(error) = self.status.publish(&GoalStatusArray { status_list }) {
+        if let Err(error) = self.status.publish(&goals.status()) {
             tracing::warn!("{error:#}");
         }
+        changed
     }
 
-    /// As rcl_action: number and stamp zero mean all goals; a stamp alone, all up to it; a number, that goal, with a
-    /// stamp also those up to it.
     fn cancel(&self, request: &CancelGoalRequest) -> CancelGoalResponse {
-        let GoalInfo { goal_id: UUID { uuid: id }, stamp } = request.goal_info;
-        let (by_id, until) = (id != [0; 16], Stamp::from(stamp));
-        let mut response = CancelGoalResponse::default();
-        {
-            let mut goals = self.goals();
-            if by_id && until == Stamp::ZERO {
-                response.return_code = match goals.iter().find(|record| record.id == id) {
-                    None => CancelGoalResponse::ERROR_UNKNOWN_GOAL_ID,
-                    Some(record) if record.has_ended() => CancelGoalResponse::ERROR_GOAL_TERMINATED,
-                    Some(_) => CancelGoalResponse::ERROR_NONE,
-                };
-            }
-            for record in goals.iter_mut().filter(|record| !record.has_ended()) {
-                let all = !by_id && until == Stamp::ZERO;
-                if all
-                    || (by_id && record.id == id)
-                    || (until > Stamp::ZERO && record.stamp <= until)
-                {
-                    record.status = GoalStatus::STATUS_CANCELING;
-                    record.cancel.stop();
-                    response.goals_canceling.push(record.info());
-                }
-            }
-        }
-        self.tell();
-        response
+        self.change(|goals| goals.cancel(request))
     }
 
-    async fn give_results(self: Arc<Self>, server: Arc<Server<A::GetResult>>) {
-        while let Some((call, request)) = self.stop.or(server.receive()).await {
-            let goals = self.goals();
-            let record = goals.iter().find(|record| record.id == request.goal_id.uuid);
-            let end = record.map(|record| record.end.subscribe());
-            drop(goals);
-            let (server, stop) = (Arc::clone(&server), self.stop.clone());
-            tokio::spawn(async move {
-                let answer = match end {
-                    None => Some(GetResultResponse::default()),
-                    Some(mut end) => match stop.or(end.wait_for(Option::is_some)).await {
-                        Some(Ok(ended)) => ended.clone(),
-                        // The node stops.
-                        _ => None,
-                    },
-                };
-                if let Some(answer) = answer {
-                    server.answer(&call, &answer).await;
-                }
-            });
+    async fn give_results(self: Arc<Self>) {
+        while let Some((call, request)) = self.stop.or(self.results.receive()).await {
+            let answer = self.goals().ask(request.goal_id.uuid, call);
+            if let Answer::Now(call, response) = answer {
+                self.results.answer(&call, &response).await;
+            }
         }
     }
 }

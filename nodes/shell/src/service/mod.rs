@@ -7,7 +7,7 @@ mod wire;
 
 pub use client::Client;
 use puffer_msgs::Service;
-pub(crate) use server::Server;
+pub(crate) use server::{Call, Server};
 use std::time::Duration;
 pub(crate) use task::answer_all;
 

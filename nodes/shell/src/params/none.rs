@@ -1,7 +1,6 @@
-//! What the shell asks of interface types: the traits of `puffer_msgs`, and parameters for nodes without any.
+//! The parameters of a node without parameters.
 
 use puffer_core::params::{ParamSpec, Parameters};
-pub use puffer_msgs::{Action, Interface, Service};
 use serde_json::Value;
 
 /// The parameters of a node that has none of its own.

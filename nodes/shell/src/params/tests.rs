@@ -1,6 +1,5 @@
-use super::*;
+use super::store::Store;
 use crate::RosArgs;
-use puffer_msgs::rcl_interfaces::msg::{ParameterType, ParameterValue};
 
 puffer_core::params! {
     /// For the tests.
@@ -20,20 +19,11 @@ puffer_core::param_groups! {
     }
 }
 
-fn store(args: &[&str]) -> Result<Store<Both>> {
+fn store(args: &[&str]) -> anyhow::Result<Store<Both>> {
     let mut all = vec!["--ros-args".to_owned()];
     all.extend(args.iter().map(|arg| (*arg).to_owned()));
     let args = RosArgs::parse_with(all, |_| None)?;
-    Store::new("/cell/arm", &args.settings, Clock::new())
-}
-
-fn double(name: &str, value: f64) -> Parameter {
-    let value = ParameterValue {
-        r#type: ParameterType::PARAMETER_DOUBLE,
-        double_value: value,
-        ..Default::default()
-    };
-    Parameter { name: name.to_owned(), value }
+    Store::new("/cell/arm", &args.settings)
 }
 
 #[test]
@@ -41,14 +31,17 @@ fn the_users_values_are_taken_and_mistakes_are_named() {
     let set =
         store(&["-p", "reach.far:=1", "-p", "use_sim_time:=true", "-p", "arm:reach.often:=4"]);
     let set = set.unwrap();
-    assert_eq!(set.get().reach, Reach { far: 1.0, often: 4 });
-    assert!(set.clock.is_simulated());
-    assert_eq!(store(&["-p", "leg:reach.far:=7"]).unwrap().get().reach.far, 0.5);
+    assert_eq!(set.params().reach, Reach { far: 1.0, often: 4 });
+    assert!(*set.watch_sim_time().borrow());
+    assert_eq!(store(&["-p", "leg:reach.far:=7"]).unwrap().params().reach.far, 0.5);
     for (argument, says) in [
-        ("reach.far:=7", "-p reach.far:=7: invalid parameter reach.far: 7 is out of range"),
-        ("reach.near:=1", "`reach.near` is unknown; this node has use_sim_time, reach.far"),
-        ("far:=1", "`far` is unknown"),
-        ("use_sim_time:=7", "7 is not true or false"),
+        (
+            "reach.far:=7",
+            "parameter reach.far: 7 is out of range; allowed are 0 to 1 (from -p reach.far:=7)",
+        ),
+        ("reach.near:=1", "reach.near: unknown; reach has far, often"),
+        ("far:=1", "far: unknown; this node has reach.far, reach.often, use_sim_time"),
+        ("use_sim_time:=7", "7 is not of type boolean"),
     ] {
         let error = store(&["-p", argument]).err().unwrap().to_string();
         assert!(error.contains(says) && error.contains("/cell/arm"), "{error}");
@@ -66,20 +59,9 @@ fn a_pattern_leaves_out_what_a_node_lacks_and_gives_way_to_the_nodes_own() {
         "cell: {arm: {ros__parameters: {reach: {far: 0.25}}}}\n\
          /**: {ros__parameters: {reach: {far: 0.75, often: 5}, other: {x: 1}}}\n",
     );
-    let set = store(&["--params-file", &file]).unwrap().get();
+    let set = store(&["--params-file", &file]).unwrap().params();
     assert_eq!(set.reach, Reach { far: 0.25, often: 5 });
     let file = write("/**: {ros__parameters: {reach: {far: 5}}}\n");
     assert!(store(&["--params-file", &file]).err().unwrap().to_string().contains("out of range"));
     std::fs::remove_file(dir).unwrap();
-}
-
-#[test]
-fn a_change_is_made_as_a_whole_or_not_at_all() {
-    let store = store(&[]).unwrap();
-    store.set(&[double("reach.far", 0.75)]).unwrap();
-    assert_eq!(store.get().reach.far, 0.75);
-    let error = store.set(&[double("reach.far", 0.25), double("reach.far", 9.0)]).unwrap_err();
-    assert!(error.contains("out of range"), "{error}");
-    assert!(store.set(&[double("reach.often", 2.5)]).unwrap_err().contains("integer"));
-    assert_eq!(store.get().reach.far, 0.75);
 }
