@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 use crate::mesh::io::{Unit, read_cloud_in};
 use crate::reconstruct::{ReconstructParams, reconstruct};
 use crate::register::{PreparedScan, RegisterParams, Registration, Status, register};
-use crate::scans::{PoseSigma, ScanFiles};
+use crate::scans::{PoseSigma, ScanSource, Support};
 use crate::{Error, Progress, Result};
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -26,7 +26,7 @@ crate::param_groups! {
 /// What a mesh can be made of.
 pub enum Input {
     /// Scans with the robot's poses.
-    Scans(ScanFiles),
+    Scans(ScanSource),
     /// One cloud of registered points with normals.
     Cloud(Cloud),
 }
@@ -42,7 +42,7 @@ impl Input {
         if is_ply && path.is_file() {
             return Ok(Input::Cloud(read_cloud_in(path, unit)?));
         }
-        Ok(Input::Scans(ScanFiles::open(path, unit)?))
+        Ok(Input::Scans(ScanSource::open(path, unit)?))
     }
 }
 
@@ -65,39 +65,28 @@ pub struct Prepared {
     pub robot: Vec<Pose>,
     /// Standard deviation of those poses, if known.
     pub pose_sigma: Option<PoseSigma>,
-    /// SHA-256 of the points and poses, in hexadecimal.
-    pub hash: String,
 }
 
 /// Reads all scans and estimates their normals.
 ///
 /// # Errors
-/// As [`ScanFiles::view`], and [`Error::Input`] naming the view that cannot be used; [`Error::Cancelled`].
-pub fn prepare(files: &ScanFiles, progress: &Progress) -> Result<Prepared> {
+/// As [`ScanSource::view`], and [`Error::Input`] naming the view that cannot be used; [`Error::Cancelled`].
+pub fn prepare(files: &ScanSource, progress: &Progress) -> Result<Prepared> {
     let mut prepared = Prepared {
         scans: Vec::new(),
         names: Vec::new(),
         robot: Vec::new(),
         pose_sigma: files.pose_sigma,
-        hash: String::new(),
     };
-    let mut hash = Sha256::new();
     for index in 0..files.len() {
         progress.report("read", index as f64 / files.len() as f64)?;
         let view = files.view(index)?;
-        for value in view.scan.points.iter().chain(&view.scan.origins).flatten() {
-            hash.update(value.to_le_bytes());
-        }
-        for value in view.object_from_sensor.to_homogeneous().iter() {
-            hash.update(value.to_le_bytes());
-        }
         let scan = PreparedScan::new(&view.scan)
             .map_err(|error| Error::input(format!("view {}: {error}", view.name)))?;
         prepared.scans.push(scan);
         prepared.names.push(view.name);
         prepared.robot.push(view.object_from_sensor);
     }
-    prepared.hash = hex(hash);
     progress.report("read", 1.0)?;
     Ok(prepared)
 }
@@ -138,18 +127,25 @@ pub fn filter_scans(
     filter(&scans, registration.residual, params, progress)
 }
 
-/// The digest in hexadecimal.
-fn hex(hash: Sha256) -> String {
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// SHA-256 of a cloud's points and normals, in hexadecimal.
+/// SHA-256 of a cloud's points, normals and standard deviations, in hexadecimal.
 pub fn cloud_hash(cloud: &Cloud) -> String {
     let mut hash = Sha256::new();
     for value in cloud.points.iter().chain(&cloud.normals).flat_map(|v| v.iter()) {
         hash.update(value.to_le_bytes());
     }
-    hex(hash)
+    for sigma in &cloud.sigma {
+        hash.update(sigma.to_le_bytes());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The comment lines of a mesh file: program, seed, and the hash of the cloud that the mesh was made of.
+pub fn comments(cloud: &Cloud, seed: u64) -> [String; 3] {
+    [
+        format!("puffer {}", env!("CARGO_PKG_VERSION")),
+        format!("seed {seed}"),
+        format!("cloud sha256 {}", cloud_hash(cloud)),
+    ]
 }
 
 /// What the whole way gives.
@@ -164,11 +160,9 @@ pub struct Outcome {
     pub registration: Option<Registration>,
     /// Names of the views, empty for a single cloud.
     pub names: Vec<String>,
-    /// SHA-256 of the data that went in.
-    pub hash: String,
 }
 
-/// From input to mesh.
+/// From input to mesh. What the scans say of the object's support counts unless `params` say something else.
 ///
 /// # Errors
 /// Those of the stages.
@@ -176,7 +170,6 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
     let files = match input {
         Input::Cloud(cloud) => {
             let mesh = reconstruct(cloud, &params.reconstruct, progress)?;
-            let hash = cloud_hash(cloud);
             let (cloud, measurements) = (cloud.clone(), cloud.len());
             return Ok(Outcome {
                 mesh,
@@ -184,7 +177,6 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
                 measurements,
                 registration: None,
                 names: Vec::new(),
-                hash,
             });
         }
         Input::Scans(files) => files,
@@ -192,14 +184,16 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
     let prepared = prepare(files, progress)?;
     let registration = register_scans(&prepared, poses, &params.register, progress)?;
     let filtered = filter_scans(&prepared, &registration, &params.filter, progress)?;
-    let Prepared { names, hash, .. } = prepared;
-    let mesh = reconstruct(&filtered.cloud, &params.reconstruct, progress)?;
+    let mut of_reconstruct = params.reconstruct.clone();
+    if of_reconstruct.support == Support::None {
+        of_reconstruct.support = files.support;
+    }
+    let mesh = reconstruct(&filtered.cloud, &of_reconstruct, progress)?;
     Ok(Outcome {
         mesh,
         cloud: filtered.cloud,
         measurements: filtered.measurements,
         registration: Some(registration),
-        names,
-        hash,
+        names: prepared.names,
     })
 }

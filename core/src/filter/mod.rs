@@ -44,7 +44,7 @@ crate::params! {
 /// A filtered cloud and the radii that made it.
 #[derive(Clone, Debug)]
 pub struct Filtered {
-    /// One point per reduction radius, object frame.
+    /// One point per reduction radius, object frame, in single precision.
     pub cloud: Cloud,
     /// Radius within which measurements were combined, metres.
     pub noise_radius: f64,
@@ -87,6 +87,7 @@ pub fn filter(
         )));
     }
     progress.report("filter", 1.0)?;
+    let cloud = cloud.to_single_precision();
     Ok(Filtered { cloud, noise_radius, reduction_radius, measurements: merged.points.len() })
 }
 

@@ -95,6 +95,17 @@ impl Cloud {
         selected
     }
 
+    /// The cloud as files and messages hold it, so that every way from the points to a mesh gives the same bytes.
+    pub fn to_single_precision(mut self) -> Cloud {
+        for vector in self.points.iter_mut().chain(&mut self.normals) {
+            *vector = vector.map(|v| f64::from(v as f32));
+        }
+        for sigma in &mut self.sigma {
+            *sigma = f64::from(*sigma as f32);
+        }
+        self
+    }
+
     /// Checks that a surface can be made of the cloud.
     ///
     /// # Errors

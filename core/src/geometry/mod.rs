@@ -7,6 +7,7 @@ mod kdtree;
 mod median;
 mod pose;
 mod sensor;
+mod shape;
 mod surface;
 
 pub use aabb::Aabb;
@@ -18,6 +19,8 @@ pub use pose::{
     Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,
 };
 pub use sensor::{SensorModel, SensorRay, StereoModel, StriperModel};
+pub use shape::Shape;
+pub(crate) use shape::Solid;
 pub use surface::{Projection, Surface};
 
 /// A point or vector, metres.

@@ -1,9 +1,9 @@
-//! Searches over the triangles of a fixed surface. The only file that knows parry3d's types.
+//! Searches over the triangles of a fixed surface. Only this file and `shape.rs` know parry3d's types.
 
-use super::{Aabb, Vec3};
+use super::{Aabb, Pose, Vec3};
 use crate::{Error, Result};
 use parry3d_f64::bounding_volume::Aabb as ParryAabb;
-use parry3d_f64::math::Vector;
+use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::TriMesh;
 
@@ -72,6 +72,12 @@ impl Surface {
 
 fn to_parry(v: &Vec3) -> Vector {
     Vector::new(v.x, v.y, v.z)
+}
+
+pub(super) fn parry_pose(pose: &Pose) -> ParryPose {
+    let q = &pose.rotation;
+    let rotation = Rotation::from_xyzw(q.i, q.j, q.k, q.w);
+    ParryPose { rotation, translation: to_parry(&pose.translation.vector) }
 }
 
 fn from_parry(v: Vector) -> Vec3 {

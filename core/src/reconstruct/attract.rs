@@ -16,6 +16,8 @@ pub(super) struct Pull {
     pub displacement: Vec3,
     /// Standard deviation of the surface there along the normal, metres.
     pub sigma: f64,
+    /// Whether measured points, not those of the support plane, have most of the weight.
+    pub measured: bool,
 }
 
 /// Points whose normal leans away from the vertex's by more than 75 degrees belong to another part.
@@ -52,6 +54,7 @@ impl<'a> Measurements<'a> {
     fn implicit(&self, vertex: &Vec3, normal: &Vec3, width: f64) -> Option<Pull> {
         let (mut total, mut distance, mut square, mut variance, mut count) =
             (0.0, 0.0, 0.0, 0.0, 0);
+        let mut measured = 0.0;
         self.cells.for_each_within(&self.cloud.points, vertex, 2.5 * width, |i, squared| {
             let agreement = self.cloud.normals[i].dot(normal);
             if agreement < SAME_SIDE {
@@ -64,6 +67,7 @@ impl<'a> Measurements<'a> {
             let offset = self.cloud.points[i] - vertex;
             let height = (self.cloud.normals[i] + normal).dot(&offset) / (1.0 + agreement);
             total += weight;
+            measured += weight * self.measured(i);
             distance += weight * height;
             square += weight * height * height;
             variance += weight * sigma * sigma;
@@ -78,6 +82,7 @@ impl<'a> Measurements<'a> {
             displacement: normal * mean,
             // Neighbouring filtered points share measurements: their mean is no better than one of them.
             sigma: (variance / total + spread / count as f64).sqrt(),
+            measured: measured > 0.5 * total,
         })
     }
 
@@ -85,6 +90,7 @@ impl<'a> Measurements<'a> {
     /// that of the distances (§2.4.6).
     fn thesis(&self, vertex: &Vec3, normal: &Vec3, width: f64) -> Option<Pull> {
         let (mut offset, mut sum, mut square, mut count) = (Vec3::zeros(), 0.0, 0.0, 0.0);
+        let mut measured = 0.0;
         self.cells.for_each_within(&self.cloud.points, vertex, width, |i, _| {
             let to_point = self.cloud.points[i] - vertex;
             let height = to_point.dot(normal);
@@ -92,11 +98,18 @@ impl<'a> Measurements<'a> {
             sum += height;
             square += height * height;
             count += 1.0;
+            measured += self.measured(i);
         });
         (count > 0.0).then(|| Pull {
             displacement: offset / count * 0.5,
             sigma: (square / count - (sum / count).powi(2)).max(0.0).sqrt(),
+            measured: measured > 0.5 * count,
         })
+    }
+
+    /// 1 if a scan saw the point, else 0.
+    fn measured(&self, point: usize) -> f64 {
+        f64::from(u8::from(self.cloud.support[point] > 0))
     }
 
     fn sigma(&self, point: usize, width: f64) -> f64 {

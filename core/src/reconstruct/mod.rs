@@ -10,12 +10,15 @@ mod detail;
 mod field;
 mod guard;
 mod shape;
+mod support;
 mod winding;
 
 use crate::geometry::{Cloud, Vec3};
 use crate::mesh::{HalfEdgeMesh, Mesh};
+use crate::scans::Support;
 use crate::{Progress, Result};
 use attract::{Measurements, Pull};
+use support::with_support_plane;
 
 crate::choice! {
     /// How the mesh is inflated.
@@ -52,6 +55,8 @@ crate::params! {
         voxel_edge: f64 = 0.0, in [0.0, 1.0], unit "m";
         /// Steps from the first to the finished edge length (`i_max`).
         iterations: usize = 4, in [0, 1000];
+        /// What the object stands on; its underside then closes there.
+        support: Support = Support::None;
         /// Separate bodies that are kept at most, the largest first.
         components: usize = 1, in [1, 1000];
         /// Strength `k_s` of the thesis's smoothing.
@@ -106,7 +111,8 @@ fn spacing(cloud: &Cloud) -> f64 {
 }
 
 /// A closed, two-manifold, oriented mesh without self-intersections round the volume that the points enclose, with
-/// normals, standard deviations and what was observed.
+/// normals, standard deviations and what was observed. Points supported by 0 scans shape it but do not count as
+/// measured.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) if the points are fewer than 50, lie in a plane or enclose nothing;
@@ -116,6 +122,14 @@ pub fn reconstruct(cloud: &Cloud, params: &ReconstructParams, progress: &Progres
     cloud.check_volume(50)?;
     let scale = Scale::of(cloud, params);
     progress.report("inflate", 0.0)?;
+    let supported;
+    let cloud = match params.support {
+        Support::None => cloud,
+        Support::Table => {
+            supported = with_support_plane(cloud, scale.points);
+            &supported
+        }
+    };
     let inflated = match params.inflate {
         InflateMethod::Field => {
             field::inflate(cloud, scale.voxel, scale.points, params.components, progress)?
@@ -145,10 +159,13 @@ fn with_confidence(
     };
     let pulls: Vec<Option<Pull>> = (0..plain.vertices.len()).map(pull).collect();
     // What is left of the pull is error too.
-    let sigma =
-        |p: &Option<Pull>| p.as_ref().map_or(f64::NAN, |p| p.sigma.hypot(p.displacement.norm()));
+    let sigma = |p: &Option<Pull>| match p {
+        Some(p) if p.measured => p.sigma.hypot(p.displacement.norm()),
+        _ => f64::NAN,
+    };
     plain.sigma = pulls.iter().map(sigma).collect();
-    plain.observed = pulls.iter().map(Option::is_some).collect();
+    let measured = |p: &Option<Pull>| p.as_ref().is_some_and(|p| p.measured);
+    plain.observed = pulls.iter().map(measured).collect();
     plain
 }
 

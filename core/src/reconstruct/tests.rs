@@ -131,3 +131,30 @@ fn one_and_two_threads_give_the_same_bits() {
     };
     assert_eq!(with(1), with(2));
 }
+
+#[test]
+fn an_object_on_a_table_gets_its_flat_underside_and_nobody_claims_to_have_seen_it() {
+    let whole = cloud_on(&test_shapes::sphere(0.05, 4), 0.0015);
+    // A ball cut flat 30 mm below its middle, and its lowest 2 mm hidden.
+    let mut cloud = Cloud::default();
+    for i in (0..whole.len()).filter(|&i| whole.points[i].z > -0.028) {
+        let point = whole.points[i] + Vec3::new(0.0, 0.0, 0.03);
+        cloud.push(point, whole.normals[i], whole.sigma[i], whole.support[i]);
+    }
+    let on_table = ReconstructParams { support: Support::Table, ..ReconstructParams::default() };
+    let mesh = run(&cloud, &on_table);
+    assert_watertight(&mesh, 0);
+    let lowest = mesh.vertices.iter().map(|v| v.z).fold(1.0, f64::min);
+    assert!(lowest.abs() < 3e-4, "{lowest}");
+    let under: Vec<usize> =
+        (0..mesh.vertices.len()).filter(|&i| mesh.vertices[i].xy().norm() < 0.035).collect();
+    let below = under.iter().filter(|&&i| mesh.vertices[i].z < 0.01);
+    for &i in below {
+        assert!(mesh.vertices[i].z.abs() < 3e-4, "{}", mesh.vertices[i]);
+        assert!(!mesh.observed[i] && mesh.sigma[i].is_nan());
+    }
+    // The disc that a plane cuts from a ball: volume of the cap above it.
+    let (r, h) = (0.05_f64, 0.08_f64);
+    let expected = std::f64::consts::PI * h * h * (3.0 * r - h) / 3.0;
+    assert!((mesh.volume() / expected - 1.0).abs() < 0.01, "{}", mesh.volume() / expected);
+}

@@ -10,11 +10,13 @@ mod align;
 mod factors;
 mod joint;
 mod prepare;
+mod registrar;
 mod sigma;
 mod stages;
 mod verdict;
 
 pub use prepare::PreparedScan;
+pub use registrar::Registrar;
 pub use verdict::{Status, Verdict};
 
 use crate::geometry::Pose;
@@ -107,26 +109,36 @@ pub fn register(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    if scans.is_empty() || scans.len() != robot.len() {
+    let samples: Vec<joint::Sample> =
+        scans.iter().map(|s| joint::Sample::new(s, params.samples)).collect();
+    register_samples(&samples, robot, pose_sigma, params, progress)
+}
+
+fn register_samples(
+    samples: &[joint::Sample],
+    robot: &[Pose],
+    pose_sigma: Option<PoseSigma>,
+    params: &RegisterParams,
+    progress: &Progress,
+) -> Result<Registration> {
+    if samples.is_empty() || samples.len() != robot.len() {
         return Err(Error::input(format!(
             "{} scans with {} poses: each scan needs one pose",
-            scans.len(),
+            samples.len(),
             robot.len()
         )));
     }
-    let samples: Vec<joint::Sample> =
-        scans.iter().map(|s| joint::Sample::new(s, params.samples)).collect();
-    let pose_sigma = pose_sigma.unwrap_or_else(|| sigma::estimate(&samples, robot));
-    let mut registration = stages::two_stages(&samples, robot, pose_sigma, params, progress)?;
+    let pose_sigma = pose_sigma.unwrap_or_else(|| sigma::estimate(samples, robot));
+    let mut registration = stages::two_stages(samples, robot, pose_sigma, params, progress)?;
     if params.joint && params.method != Method::Thesis {
-        joint::optimise(&samples, robot, &mut registration, params, progress)?;
+        joint::optimise(samples, robot, &mut registration, params, progress)?;
         // The first scans' errors had moved the map away from the priors. It stands right now: what was refused
         // for that reason has another chance.
-        if stages::place_rest(&samples, robot, &mut registration, params, progress)? > 0 {
-            joint::optimise(&samples, robot, &mut registration, params, progress)?;
+        if stages::place_rest(samples, robot, &mut registration, params, progress)? > 0 {
+            joint::optimise(samples, robot, &mut registration, params, progress)?;
         }
     }
-    registration.residual = joint::residual(&samples, &registration);
+    registration.residual = joint::residual(samples, &registration);
     Ok(registration)
 }
 

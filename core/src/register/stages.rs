@@ -26,6 +26,11 @@ impl Sample {
     }
 }
 
+/// The verdict on a scan before it was looked at.
+pub(crate) fn waiting(sigma: PoseSigma) -> Verdict {
+    Verdict { status: Status::Deferred, ..Verdict::first(&sigma.information()) }
+}
+
 /// Aligns all scans to the first and to those accepted before them; those that no round could place are refused
 /// and keep the robot's pose.
 pub(crate) fn two_stages(
@@ -35,8 +40,7 @@ pub(crate) fn two_stages(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let waiting = Verdict { status: Status::Deferred, ..Verdict::first(&sigma.information()) };
-    let mut verdicts = vec![waiting; samples.len()];
+    let mut verdicts = vec![waiting(sigma); samples.len()];
     verdicts[0].status = Status::Accepted;
     let mut registration =
         Registration { poses: robot.to_vec(), verdicts, pose_sigma: sigma, residual: f64::NAN };
@@ -93,7 +97,8 @@ pub(crate) fn place_rest(
     Ok(joined)
 }
 
-fn place(
+/// Aligns one scan to the map and judges the outcome.
+pub(crate) fn place(
     sample: &Sample,
     map: &Map,
     robot: &Pose,

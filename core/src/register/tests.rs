@@ -169,3 +169,37 @@ fn a_cancelled_registration_stops() {
         register(&case.scans, &case.robot, Some(SIGMA), &RegisterParams::default(), &progress);
     assert!(matches!(outcome, Err(Error::Cancelled)));
 }
+
+#[test]
+fn scans_that_come_one_by_one_are_placed_put_aside_and_refined_as_all_at_once() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let mut registrar = Registrar::new(SIGMA, params.clone());
+    // The fourth looks from the other side: it has to wait for those between.
+    let order = [0, 4, 1, 2, 3, 5, 6, 7];
+    let mut placed_later = Vec::new();
+    for (n, &i) in order.iter().enumerate() {
+        let changed = registrar.add(&case.scans[i], &case.robot[i]);
+        assert_eq!(changed[0], n);
+        placed_later.extend_from_slice(&changed[1..]);
+    }
+    assert_eq!(placed_later, [1], "the scan from the other side was not tried again");
+    for n in 0..order.len() {
+        assert_eq!(
+            registrar.verdict(n).status,
+            Status::Accepted,
+            "{}",
+            registrar.verdict(n).reason
+        );
+    }
+    let sorted = |values: &[Pose]| order.iter().map(|&i| values[i]).collect::<Vec<_>>();
+    let poses: Vec<Pose> = (0..order.len()).map(|n| registrar.pose(n)).collect();
+    assert!(error(&poses, &sorted(&case.truth)) < 5e-4);
+
+    let refined = registrar.refine(&Progress::silent()).unwrap();
+    let scans: Vec<PreparedScan> = order.iter().map(|&i| case.scans[i].clone()).collect();
+    let at_once =
+        register(&scans, &sorted(&case.robot), Some(SIGMA), &params, &Progress::silent()).unwrap();
+    assert_eq!(refined.poses, at_once.poses);
+    assert_eq!(registrar.pose(3), at_once.poses[3]);
+}

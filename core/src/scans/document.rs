@@ -1,8 +1,9 @@
 //! `poses.json`: what stands in it, and what is made of it.
 
 use super::cloud::Frame;
-use super::{PoseSigma, SensorKind, Unit};
+use super::{PoseSigma, SensorKind, Support, Unit};
 use crate::geometry::{Pose, pose_from_rows, pose_to_rows};
+use crate::params::ParamValue;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::HashSet;
@@ -31,6 +32,7 @@ pub(super) struct Parsed {
     pub(super) frame: Frame,
     pub(super) sensor: Option<SensorKind>,
     pub(super) pose_sigma: Option<PoseSigma>,
+    pub(super) support: Support,
     pub(super) nominal: Value,
     /// Folder of the clouds, from that of the document; empty for the same.
     pub(super) clouds_in: String,
@@ -73,6 +75,7 @@ pub(super) fn parse(document: &Value, path: &Path, unit: Unit) -> Result<Parsed>
         frame: frame(document).map_err(fail)?,
         sensor: sensor(document).map_err(fail)?,
         pose_sigma: pose_sigma(document, unit).map_err(fail)?,
+        support: support(document).map_err(fail)?,
         nominal: document["nominal"].clone(),
         clouds_in: document["clouds_in"].as_str().unwrap_or_default().to_owned(),
     })
@@ -133,6 +136,16 @@ fn sensor(document: &Value) -> std::result::Result<Option<SensorKind>, String> {
     let kind = value.as_str().and_then(SensorKind::from_word);
     kind.map(Some).ok_or_else(|| {
         format!("has the sensor {value}; known are \"laser\" and \"stereo\"; leave it out if neither fits")
+    })
+}
+
+fn support(document: &Value) -> std::result::Result<Support, String> {
+    let value = &document["support"];
+    if value.is_null() {
+        return Ok(Support::None);
+    }
+    Support::from_value(value).ok_or_else(|| {
+        format!("has the support {value}; known are \"none\" and \"table\" (the plane z = 0)")
     })
 }
 

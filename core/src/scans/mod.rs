@@ -1,16 +1,16 @@
 //! Scan folders and other files that hold scans with their poses.
 //!
 //! A scan folder is `poses.json` and one PLY file a view; a Stanford `*.conf` names range-grid PLYs. Either is
-//! opened with [`ScanFiles::open`], which reads what is small, or read whole with [`read_scans`].
+//! opened with [`ScanSource::open`], which reads what is small, or read whole with [`read_scans`].
 
 mod cloud;
 mod conf;
 mod document;
-mod files;
+mod source;
 mod write;
 
 pub use crate::mesh::io::Unit;
-pub use files::{ScanFiles, read_scans};
+pub use source::{ScanSource, read_scans};
 pub use write::{write_poses, write_scans};
 
 use crate::geometry::{Pose, Scan};
@@ -44,6 +44,18 @@ pub struct PoseSigma {
     pub rotation: f64,
 }
 
+crate::choice! {
+    /// What the object stands on.
+    #[derive(Default)]
+    pub enum Support {
+        /// Nothing that is known.
+        #[default]
+        None = "none",
+        /// The plane z = 0 of the object frame, the object above it.
+        Table = "table",
+    }
+}
+
 /// The scans of one object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanSet {
@@ -53,6 +65,8 @@ pub struct ScanSet {
     pub sensor: Option<SensorKind>,
     /// How uncertain the poses are, if it is known.
     pub pose_sigma: Option<PoseSigma>,
+    /// What the object stands on.
+    pub support: Support,
     /// Sensor figures as they stand in the file; null if there are none.
     pub nominal: serde_json::Value,
 }

@@ -22,6 +22,7 @@ fn set() -> ScanSet {
     ScanSet {
         views: vec![view("view_000", organised, 1.0), view("view_001", plain, 0.5)],
         sensor: Some(SensorKind::Laser),
+        support: Support::Table,
         pose_sigma: Some(PoseSigma { translation: 0.003, rotation: 0.01 }),
         nominal: json!({"distance": 0.65}),
     }
@@ -171,8 +172,9 @@ fn corrected_poses_keep_every_other_key() {
     let poses = [pose(0.1), pose(0.2)];
     let verdicts =
         [json!({"verdict": {"status": "accepted"}}), json!({"verdict": {"status": "refused"}})];
+    let source = ScanSource::open(folder.path(), Unit::M).unwrap();
     for target in [elsewhere.path().join("out.json"), folder.path().join("poses.json")] {
-        write_poses(&target, folder.path(), Unit::M, &poses, &verdicts).unwrap();
+        write_poses(&target, &source, &poses, &verdicts).unwrap();
         let json: Value = serde_json::from_slice(&fs::read(&target).unwrap()).unwrap();
         assert_eq!((&json["operator"], &json["views"][1]["time"]), (&json!("me"), &json!(12.5)));
         assert_eq!(json["views"][1]["verdict"]["status"], "refused");
@@ -184,7 +186,7 @@ fn corrected_poses_keep_every_other_key() {
         }
     }
     assert!(document(folder.path())["clouds_in"].is_null());
-    let error = write_poses(&elsewhere.path().join("x"), folder.path(), Unit::M, &poses[..1], &[]);
+    let error = write_poses(&elsewhere.path().join("x"), &source, &poses[..1], &[]);
     assert!(error.unwrap_err().to_string().contains("2 views, but 1 poses"));
 }
 
@@ -237,7 +239,8 @@ fn poses_corrected_for_a_conf_are_read_with_its_range_grids() {
     let conf = folder.path().join("a.conf");
     let out = folder.path().join("poses.json");
     let corrected = pose(0.3);
-    write_poses(&out, &conf, Unit::M, &[corrected], &[]).unwrap();
+    let source = ScanSource::open(&conf, Unit::M).unwrap();
+    write_poses(&out, &source, &[corrected], &[]).unwrap();
     let (before, after) = (read_scans(&conf, Unit::M).unwrap(), read_scans(&out, Unit::M).unwrap());
     assert_eq!(text(&before.views[0].scan), text(&after.views[0].scan));
     assert!(log(&(after.views[0].object_from_sensor.inverse() * corrected)).norm() < 1e-9);

@@ -1,10 +1,11 @@
 //! Writing of scan folders and of corrected poses.
 
 use super::document::{FORMAT, matrix};
-use super::files::read_document;
-use super::{ScanSet, Unit, View, cloud};
+use super::source::read_document;
+use super::{PoseSigma, ScanSet, ScanSource, SensorKind, Support, Unit, View, cloud};
 use crate::geometry::{Pose, Scan};
 use crate::mesh::io::write_bytes;
+use crate::params::ParamValue;
 use crate::{Error, Result};
 use serde_json::{Map, Value, json};
 use std::path::{Component, Path, PathBuf};
@@ -19,70 +20,102 @@ use std::path::{Component, Path, PathBuf};
 pub fn write_scans(dir: &Path, set: &ScanSet, extras: &[Value]) -> Result<()> {
     check_extras(extras, set.views.len())?;
     std::fs::create_dir_all(dir).map_err(|e| Error::io("create", dir, e))?;
-    let mut views: Vec<Value> = Vec::with_capacity(set.views.len());
+    let mut entries: Vec<(String, Pose)> = Vec::with_capacity(set.views.len());
     for view in &set.views {
         let file = file_name(&view.name);
         check_scan(view)?;
-        if views.iter().any(|other| other["cloud"] == *file) {
+        if entries.iter().any(|(other, _)| *other == file) {
             return Err(Error::input(format!("two views would be written to {file}: rename one")));
         }
         write_bytes(&dir.join(&file), &cloud::encode_scan(&view.scan))?;
-        let matrix = matrix(&view.object_from_sensor, Unit::M);
-        views.push(json!({"cloud": file, "object_from_sensor": matrix}));
+        entries.push((file, view.object_from_sensor));
     }
+    let head = Head {
+        sensor: set.sensor,
+        pose_sigma: set.pose_sigma,
+        support: set.support,
+        nominal: &set.nominal,
+    };
+    write_json(&dir.join("poses.json"), &new_document(&head, &entries, extras))
+}
+
+/// What a document says of all views.
+struct Head<'a> {
+    sensor: Option<SensorKind>,
+    pose_sigma: Option<PoseSigma>,
+    support: Support,
+    nominal: &'a Value,
+}
+
+/// A document of the views `entries`, each a file and a pose.
+fn new_document(head: &Head, entries: &[(String, Pose)], extras: &[Value]) -> Value {
     let mut document = Map::new();
     document.insert("format".into(), FORMAT.into());
-    if let Some(sensor) = set.sensor {
+    if let Some(sensor) = head.sensor {
         document.insert("sensor".into(), sensor.word().into());
     }
-    if !set.nominal.is_null() {
-        document.insert("nominal".into(), set.nominal.clone());
+    if !head.nominal.is_null() {
+        document.insert("nominal".into(), head.nominal.clone());
     }
-    if let Some(sigma) = set.pose_sigma {
+    if let Some(sigma) = head.pose_sigma {
         let value = json!({"translation": sigma.translation, "rotation": sigma.rotation});
         document.insert("pose_sigma".into(), value);
     }
+    if head.support != Support::None {
+        document.insert("support".into(), head.support.to_value());
+    }
+    let entry = |(file, pose): &(String, Pose)| json!({"cloud": file, "object_from_sensor": matrix(pose, Unit::M)});
+    let mut views: Vec<Value> = entries.iter().map(entry).collect();
     for (view, extra) in views.iter_mut().zip(extras) {
         add(view, extra);
     }
     document.insert("views".into(), views.into());
-    write_json(&dir.join("poses.json"), &document.into())
+    document.into()
 }
 
-/// Writes the poses file of the scans at `source` (as [`super::read_scans`] takes it) anew to `path`, with `poses` in
-/// place of its own and `extras[i]`, an object, added to view `i`; `extras` may be empty. All other keys are
-/// kept. `unit` is that of the source's lengths, and stays that of the file.
+/// Writes the poses file of the scans `source` anew to `path`, with `poses` in place of its own and `extras[i]`, an
+/// object, added to view `i`; `extras` may be empty. All other keys of the file are kept, and its unit.
 ///
-/// In another folder than the source's, the key `clouds_in` tells where the clouds are.
+/// In another folder than the source's, the key `clouds_in` tells where the clouds are. Scans that never were in
+/// files get the names that [`write_scans`] would give them.
 ///
 /// # Errors
-/// As [`super::ScanFiles::open`]; [`Error::Input`] if the counts differ; [`Error::Io`] if it cannot be written.
+/// As [`ScanSource::open`]; [`Error::Input`] if the counts differ; [`Error::Io`] if it cannot be written.
 pub fn write_poses(
     path: &Path,
-    source: &Path,
-    unit: Unit,
+    source: &ScanSource,
     poses: &[Pose],
     extras: &[Value],
 ) -> Result<()> {
-    let (mut document, source) = read_document(source)?;
-    let views = document.get_mut("views").and_then(Value::as_array_mut);
-    let views = views.map_or(&mut [][..], Vec::as_mut_slice);
-    if views.len() != poses.len() {
+    if source.len() != poses.len() {
         return Err(Error::input(format!(
-            "{} has {} views, but {} poses are to be written",
-            source.display(),
-            views.len(),
+            "the scans have {} views, but {} poses are to be written",
+            source.len(),
             poses.len()
         )));
     }
     check_extras(extras, poses.len())?;
+    let Some((file, unit)) = source.file() else {
+        let entries: Vec<(String, Pose)> =
+            (0..poses.len()).map(|i| (file_name(source.name(i)), poses[i])).collect();
+        let head = Head {
+            sensor: source.sensor,
+            pose_sigma: source.pose_sigma,
+            support: source.support,
+            nominal: &source.nominal,
+        };
+        return write_json(path, &new_document(&head, &entries, extras));
+    };
+    let (mut document, file) = read_document(file)?;
+    let views = document.get_mut("views").and_then(Value::as_array_mut);
+    let views = views.map_or(&mut [][..], Vec::as_mut_slice);
     for (view, pose) in views.iter_mut().zip(poses) {
         add(view, &json!({"object_from_sensor": matrix(pose, unit)}));
     }
     for (view, extra) in views.iter_mut().zip(extras) {
         add(view, extra);
     }
-    let clouds = source.with_file_name("").join(document["clouds_in"].as_str().unwrap_or_default());
+    let clouds = file.with_file_name("").join(document["clouds_in"].as_str().unwrap_or_default());
     if let Some(object) = document.as_object_mut() {
         object.remove("clouds_in");
         if let Some(folder) = way(&path.with_file_name(""), &clouds) {

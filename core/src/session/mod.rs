@@ -1,1 +1,331 @@
-//! The modelling loop as a pure state machine.
+//! The modelling loop as a pure state machine (Wiedemann 2014, §2): plan a view, move, scan, register,
+//! and again, until no view is left; then refine all poses, filter, reconstruct.
+//!
+//! [`step`] takes the state and an event and gives the next state and what is to be done. It knows no clock and no
+//! ROS: whoever runs it carries the commands out and reports what came of them.
+
+use crate::register::Status;
+
+crate::params! {
+    /// When the loop ends.
+    pub struct SessionParams("session") {
+        /// Scans taken at most.
+        max_scans: usize = 60, in [1, 10000];
+        /// Share of the known surface that must hold its measurements; 1 ends only when no view is left.
+        coverage: f64 = 1.0, in [0.0, 1.0];
+        /// Moves that may fail in a row before the loop goes on to the mesh.
+        max_failed_moves: usize = 3, in [1, 100];
+        /// Scans that may fail in a row before the loop goes on to the mesh.
+        max_failed_scans: usize = 2, in [1, 100];
+        /// Scans in a row that may not be registered before the loop goes on to the mesh.
+        max_unplaced: usize = 8, in [1, 1000];
+    }
+}
+
+/// What the session is waiting for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// The start.
+    Preparing,
+    /// The next view.
+    Planning,
+    /// The robot.
+    Moving,
+    /// The sensor.
+    Scanning,
+    /// The verdict on the scan.
+    Registering,
+    /// The joint optimisation.
+    Refining,
+    /// The cloud.
+    Filtering,
+    /// The mesh.
+    Reconstructing,
+    /// The operator, who paused it.
+    Paused,
+    /// Nothing more.
+    Done,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// All partners are there.
+    Ready,
+    /// The planner found a view.
+    Planned {
+        /// Share of the known surface that holds its measurements, 0 to 1.
+        coverage: f64,
+        /// What the view is expected to gain.
+        gain: f64,
+    },
+    /// The planner has no view left; why.
+    NothingLeft {
+        /// As for [`Event::Planned`].
+        coverage: f64,
+        /// Why there is none.
+        reason: String,
+    },
+    /// The robot stands at the view.
+    Moved,
+    /// The sensor delivered.
+    Scanned,
+    /// The registrar's verdict on the scan.
+    Registered(Status),
+    /// The current command succeeded (refine, filter, reconstruct).
+    Finished,
+    /// The current command failed; why.
+    Failed(String),
+    /// The operator wants to hold before the next motion.
+    Pause,
+    /// The operator wants to go on.
+    Resume,
+    /// The operator wants to end at once.
+    Cancel,
+}
+
+/// What is to be done next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Plan the next view, when `scans` scans are taken into account.
+    Plan {
+        /// Number of scans.
+        scans: usize,
+    },
+    /// Move to the planned view.
+    Move,
+    /// Take a scan.
+    Scan,
+    /// Wait for the verdict on scan `index`, counted from 0.
+    AwaitVerdict {
+        /// Number of the scan.
+        index: usize,
+    },
+    /// Optimise the poses of all `scans` scans.
+    Refine {
+        /// Number of scans.
+        scans: usize,
+    },
+    /// Combine all `scans` scans.
+    Filter {
+        /// Number of scans.
+        scans: usize,
+    },
+    /// Make the mesh.
+    Reconstruct,
+    /// Wait until the operator resumes.
+    Hold,
+    /// The end.
+    End(Outcome),
+}
+
+/// How a session ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// With a mesh; why no more scans were taken.
+    Modelled(String),
+    /// Without a mesh, in the given phase; why.
+    Failed(Phase, String),
+    /// The operator ended it.
+    Cancelled,
+}
+
+/// Everything that the session remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    params: SessionParams,
+    /// What it is waiting for.
+    pub phase: Phase,
+    /// Scans that the sensor delivered.
+    pub scans: usize,
+    /// Scans that were registered.
+    pub accepted: usize,
+    /// As the planner said last.
+    pub coverage: f64,
+    /// As the planner said last.
+    pub expected_gain: f64,
+    /// Why no more scans are taken, once that is so.
+    pub reason: String,
+    failed_moves: usize,
+    failed_scans: usize,
+    unplaced: usize,
+    pause_wanted: bool,
+}
+
+impl State {
+    /// A session that has not begun.
+    pub fn new(params: SessionParams) -> State {
+        State {
+            params,
+            phase: Phase::Preparing,
+            scans: 0,
+            accepted: 0,
+            coverage: 0.0,
+            expected_gain: 0.0,
+            reason: String::new(),
+            failed_moves: 0,
+            failed_scans: 0,
+            unplaced: 0,
+            pause_wanted: false,
+        }
+    }
+}
+
+/// The next state, and what is to be done. An event that does not fit the phase changes nothing.
+pub fn step(state: &State, event: Event) -> (State, Option<Command>) {
+    let mut next = state.clone();
+    let command = next.take(event);
+    (next, command)
+}
+
+impl State {
+    fn take(&mut self, event: Event) -> Option<Command> {
+        match (self.phase, event) {
+            (Phase::Done, _) => None,
+            (_, Event::Cancel) => Some(self.end(Outcome::Cancelled)),
+            (_, Event::Pause) => {
+                self.pause_wanted = true;
+                None
+            }
+            (Phase::Paused, Event::Resume) => {
+                self.pause_wanted = false;
+                Some(self.plan())
+            }
+            (_, Event::Resume) => {
+                self.pause_wanted = false;
+                None
+            }
+            (Phase::Preparing, Event::Ready) => Some(self.plan()),
+            (Phase::Planning, event) => self.planned(event),
+            (Phase::Moving, event) => self.moved(event),
+            (Phase::Scanning, event) => self.scanned(event),
+            (Phase::Registering, event) => self.registered(event),
+            (phase, Event::Failed(why)) => Some(self.end(Outcome::Failed(phase, why))),
+            (Phase::Refining, Event::Finished) => {
+                self.phase = Phase::Filtering;
+                Some(Command::Filter { scans: self.scans })
+            }
+            (Phase::Filtering, Event::Finished) => {
+                self.phase = Phase::Reconstructing;
+                Some(Command::Reconstruct)
+            }
+            (Phase::Reconstructing, Event::Finished) => {
+                Some(self.end(Outcome::Modelled(self.reason.clone())))
+            }
+            _ => None,
+        }
+    }
+
+    fn planned(&mut self, event: Event) -> Option<Command> {
+        match event {
+            Event::Planned { coverage, gain } => {
+                (self.coverage, self.expected_gain) = (coverage, gain);
+                if self.scans > 0 && self.params.coverage < 1.0 && coverage >= self.params.coverage
+                {
+                    return Some(self.finish("the coverage asked for is reached"));
+                }
+                self.phase = Phase::Moving;
+                Some(Command::Move)
+            }
+            Event::NothingLeft { coverage, reason } => {
+                (self.coverage, self.expected_gain) = (coverage, 0.0);
+                Some(self.finish(&reason))
+            }
+            Event::Failed(why) => Some(self.finish(&format!("planning failed: {why}"))),
+            _ => None,
+        }
+    }
+
+    fn moved(&mut self, event: Event) -> Option<Command> {
+        match event {
+            Event::Moved => {
+                self.failed_moves = 0;
+                self.phase = Phase::Scanning;
+                Some(Command::Scan)
+            }
+            Event::Failed(why) => {
+                self.failed_moves += 1;
+                if self.failed_moves >= self.params.max_failed_moves {
+                    return Some(self.finish(&format!("the robot does not move: {why}")));
+                }
+                Some(self.plan())
+            }
+            _ => None,
+        }
+    }
+
+    fn scanned(&mut self, event: Event) -> Option<Command> {
+        match event {
+            Event::Scanned => {
+                self.failed_scans = 0;
+                self.phase = Phase::Registering;
+                self.scans += 1;
+                Some(Command::AwaitVerdict { index: self.scans - 1 })
+            }
+            Event::Failed(why) => {
+                self.failed_scans += 1;
+                if self.failed_scans >= self.params.max_failed_scans {
+                    return Some(self.finish(&format!("the sensor does not deliver: {why}")));
+                }
+                Some(Command::Scan)
+            }
+            _ => None,
+        }
+    }
+
+    fn registered(&mut self, event: Event) -> Option<Command> {
+        match event {
+            Event::Registered(status) => {
+                if status == Status::Accepted {
+                    self.accepted += 1;
+                    self.unplaced = 0;
+                } else {
+                    self.unplaced += 1;
+                }
+                if self.unplaced >= self.params.max_unplaced {
+                    return Some(self.finish("too many scans in a row could not be registered"));
+                }
+                if self.scans >= self.params.max_scans {
+                    return Some(self.finish("the number of scans allowed is reached"));
+                }
+                Some(self.plan())
+            }
+            Event::Failed(why) => {
+                // The registrar may have lost it: what it holds still makes a mesh.
+                self.scans -= 1;
+                Some(self.finish(&format!("a scan was not registered: {why}")))
+            }
+            _ => None,
+        }
+    }
+
+    /// Plans, unless the operator wants to hold.
+    fn plan(&mut self) -> Command {
+        if self.pause_wanted {
+            self.phase = Phase::Paused;
+            return Command::Hold;
+        }
+        self.phase = Phase::Planning;
+        Command::Plan { scans: self.scans }
+    }
+
+    /// Goes on to the mesh with what was measured.
+    fn finish(&mut self, reason: &str) -> Command {
+        self.reason = reason.to_owned();
+        if self.accepted == 0 {
+            let phase = self.phase;
+            return self
+                .end(Outcome::Failed(phase, format!("no scan to make a mesh of: {reason}")));
+        }
+        self.phase = Phase::Refining;
+        Command::Refine { scans: self.scans }
+    }
+
+    fn end(&mut self, outcome: Outcome) -> Command {
+        self.phase = Phase::Done;
+        Command::End(outcome)
+    }
+}
+
+#[cfg(test)]
+mod tests;

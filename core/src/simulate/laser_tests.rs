@@ -46,8 +46,8 @@ fn the_sweep_wanders_0_007_mm_a_profile() {
     let (mut steps, mut ends) = (Vec::new(), Vec::new());
     for seed in 0..20 {
         let params = SimulateParams::default();
-        let scene = Scene::new(&mesh).unwrap();
-        let walk = Striper::new(&scene, &params).wander(Dice { seed, view: 0 });
+        let scene = Scene::new(&mesh, &Mesh::default()).unwrap();
+        let walk = Striper::new(model_for(&scene, &params), &scene).wander(Dice { seed, view: 0 });
         steps.extend(walk.windows(2).map(|w| (w[1] - w[0]).norm_squared() / 3.0));
         ends.push(walk[0].norm_squared() / 3.0 / (walk.len() / 2) as f64);
         assert_eq!(walk[walk.len() / 2], Vec3::zeros());
@@ -110,6 +110,6 @@ fn laser_and_camera_both_see_each_point_and_the_rest_is_shadow() {
 }
 
 fn view_ray(index: usize) -> Vec3 {
-    let scene = Scene::new(&two_slabs()).unwrap();
-    Striper::new(&scene, &SimulateParams::default()).ray(index % POINTS)
+    let scene = Scene::new(&two_slabs(), &Mesh::default()).unwrap();
+    Striper::new(model_for(&scene, &SimulateParams::default()), &scene).ray(index % POINTS)
 }

@@ -13,10 +13,10 @@ mod scene;
 mod stereo;
 mod views;
 
-pub use noise::{FLYING, GOOD, NoiseFamily, OUTLIER};
+pub use noise::{FLYING, GOOD, NoiseFamily, OUTLIER, SURROUNDINGS};
 pub use views::view_poses;
 
-use crate::geometry::{Pose, Scan, Vec3};
+use crate::geometry::{Pose, Scan, SensorModel, Vec3};
 use crate::mesh::Mesh;
 use crate::scans::PoseSigma;
 use crate::{Progress, Result};
@@ -48,7 +48,7 @@ pub struct SimulatedView {
     pub reported_pose: Pose,
     /// `object_from_sensor` as it was.
     pub true_pose: Pose,
-    /// [`GOOD`], [`OUTLIER`] or [`FLYING`].
+    /// [`GOOD`], [`OUTLIER`], [`FLYING`] or [`SURROUNDINGS`].
     pub labels: Vec<u8>,
     /// Where the ray truly met the object, in the true sensor frame, metres.
     pub hits: Vec<[f32; 3]>,
@@ -68,27 +68,47 @@ pub struct SimulatedScans {
 /// A sensor and a robot before a fixed object.
 pub struct Simulator {
     scene: scene::Scene,
-    params: SimulateParams,
+    family: NoiseFamily,
+    sensor: SensorModel,
     seed: u64,
 }
 
 impl Simulator {
-    /// Sets the object `truth` (metres, object frame) before the sensor.
+    /// Sets the object `truth` (metres, object frame) alone before a sensor that fits its size.
     ///
     /// # Errors
     /// As [`objects::check_ground_truth`].
     pub fn new(truth: &Mesh, params: &SimulateParams, seed: u64) -> Result<Simulator> {
         objects::check_ground_truth(truth)?;
-        Ok(Simulator { scene: scene::Scene::new(truth)?, params: params.clone(), seed })
+        let scene = scene::Scene::new(truth, &Mesh::default())?;
+        let family = params.family;
+        let sensor = if family.is_stereo() {
+            SensorModel::Stereo(stereo::model_for(&scene, params))
+        } else {
+            SensorModel::Striper(laser::model_for(&scene, params))
+        };
+        Ok(Simulator { scene, family, sensor, seed })
+    }
+
+    /// Sets the object `truth` and what stands round it (metres, object frame; its triangles face outwards)
+    /// before `sensor`, whose noise is that of `family`, on a robot of the same.
+    ///
+    /// # Errors
+    /// As [`objects::check_ground_truth`].
+    pub fn with_surroundings(
+        truth: &Mesh,
+        surroundings: &Mesh,
+        sensor: SensorModel,
+        family: NoiseFamily,
+        seed: u64,
+    ) -> Result<Simulator> {
+        objects::check_ground_truth(truth)?;
+        Ok(Simulator { scene: scene::Scene::new(truth, surroundings)?, family, sensor, seed })
     }
 
     /// Distance from the sensor to the object's middle, metres.
     pub fn distance(&self) -> f64 {
-        if self.params.family.is_stereo() {
-            stereo::distance(&self.scene, &self.params)
-        } else {
-            laser::Striper::new(&self.scene, &self.params).distance
-        }
+        self.sensor.working_distance()
     }
 
     /// The true poses `object_from_sensor` of `count` views spread over the sphere.
@@ -98,20 +118,35 @@ impl Simulator {
 
     /// Scan number `view` from `true_pose` (`object_from_sensor`). A laser sweep is centred on the pose.
     pub fn scan(&self, view: usize, true_pose: &Pose) -> SimulatedView {
-        let dice = noise::Dice { seed: self.seed, view: view as u64 };
-        let family = self.params.family;
-        let (scan, labels, hits) = if family.is_stereo() {
-            stereo::scan(&self.scene, &self.params, true_pose, dice)
-        } else {
-            laser::Striper::new(&self.scene, &self.params).scan(&self.scene, true_pose, dice)
+        let error = robot::pose_error(self.family, self.dice(view));
+        self.look(view, true_pose, true_pose * error.inverse())
+    }
+
+    /// Scan number `view`, taken while the robot reports `reported_pose` (`object_from_sensor`) and stands a little
+    /// beside it.
+    pub fn scan_at(&self, view: usize, reported_pose: &Pose) -> SimulatedView {
+        let error = robot::pose_error(self.family, self.dice(view));
+        self.look(view, &(reported_pose * error), *reported_pose)
+    }
+
+    fn look(&self, view: usize, true_pose: &Pose, reported_pose: Pose) -> SimulatedView {
+        let dice = self.dice(view);
+        let (scan, labels, hits) = match self.sensor {
+            SensorModel::Stereo(model) => stereo::scan(&self.scene, &model, true_pose, dice),
+            SensorModel::Striper(model) => {
+                laser::Striper::new(model, &self.scene).scan(&self.scene, true_pose, dice)
+            }
         };
-        let reported_pose = robot::reported_pose(family, true_pose, dice);
         SimulatedView { scan, reported_pose, true_pose: *true_pose, labels, hits }
+    }
+
+    fn dice(&self, view: usize) -> noise::Dice {
+        noise::Dice { seed: self.seed, view: view as u64 }
     }
 
     /// What the robot states of its poses.
     pub fn pose_sigma(&self) -> PoseSigma {
-        robot::pose_sigma(self.params.family)
+        robot::pose_sigma(self.family)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Rays into the true object.
 
+use super::noise::{GOOD, SURROUNDINGS};
 use crate::Result;
 use crate::geometry::{Aabb, Pose, Surface, Vec3};
 use crate::mesh::Mesh;
@@ -12,8 +13,12 @@ const CLEARANCE: f64 = 1e-5;
 pub(crate) struct Scene {
     surface: Surface,
     normals: Vec<Vec3>,
-    /// Bounding box, object frame, metres.
+    /// Bounding box of the object, object frame, metres.
     pub aabb: Aabb,
+    /// Bounding box of the object and all round it, metres.
+    bounds: Aabb,
+    /// The object's triangles come first.
+    of_object: usize,
 }
 
 /// Where a ray met the object.
@@ -25,17 +30,34 @@ pub(crate) struct Hit {
     pub cosine: f64,
     /// Depth as the sensor measures it (along the ray or along z), metres.
     pub depth: f64,
+    /// Whether it is the object that was met, not what stands round it.
+    pub on_object: bool,
+}
+
+impl Hit {
+    /// The label of a point without other faults.
+    pub(crate) fn label(&self) -> u8 {
+        if self.on_object { GOOD } else { SURROUNDINGS }
+    }
 }
 
 impl Scene {
-    /// Builds the hierarchy over `truth`.
+    /// Builds the hierarchy over `truth` and its `surroundings` (object frame), which may be empty.
     ///
     /// # Errors
     /// As [`Surface::new`].
-    pub(crate) fn new(truth: &Mesh) -> Result<Scene> {
-        let surface = Surface::new(&truth.vertices, &truth.triangles)?;
-        let normals = (0..truth.triangles.len()).map(|i| truth.triangle_normal(i)).collect();
-        Ok(Scene { surface, normals, aabb: truth.aabb() })
+    pub(crate) fn new(truth: &Mesh, surroundings: &Mesh) -> Result<Scene> {
+        let first = truth.vertices.len() as u32;
+        let shifted = surroundings.triangles.iter().map(|t| t.map(|v| v + first));
+        let mut all = Mesh {
+            vertices: [&truth.vertices[..], &surroundings.vertices[..]].concat(),
+            ..Mesh::default()
+        };
+        all.triangles = truth.triangles.iter().copied().chain(shifted).collect();
+        let surface = Surface::new(&all.vertices, &all.triangles)?;
+        let normals = (0..all.triangles.len()).map(|i| all.triangle_normal(i)).collect();
+        let (aabb, bounds) = (truth.aabb(), all.aabb());
+        Ok(Scene { surface, normals, aabb, bounds, of_object: truth.triangles.len() })
     }
 
     /// Half the diagonal of the object's box, metres.
@@ -55,12 +77,17 @@ impl Scene {
     ) -> Option<Hit> {
         let place = |p: &Vec3| object_from_sensor.transform_point(&Point3::from(*p)).coords;
         let (from, along) = (place(origin), object_from_sensor.rotation * direction);
-        let reach = (from - self.aabb.center()).norm() + self.radius();
+        let reach = (from - self.bounds.center()).norm() + self.bounds.diagonal() / 2.0;
         let (depth, triangle) = self.surface.cast_ray(&from, &along, reach)?;
         let normal = &self.normals[triangle];
         let cosine = -along.dot(normal);
         let seen = cosine > 0.0 && self.sees(&place(witness), &(from + along * depth), normal);
-        seen.then(|| Hit { point: origin + direction * depth, cosine, depth })
+        seen.then(|| Hit {
+            point: origin + direction * depth,
+            cosine,
+            depth,
+            on_object: triangle < self.of_object,
+        })
     }
 
     /// Whether nothing stands between `eye` and the surface point (object frame).

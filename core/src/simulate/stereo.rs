@@ -8,18 +8,15 @@ use super::noise::{
 };
 use super::scene::{Hit, Scene};
 use super::{SimulateParams, f32s};
-use crate::geometry::{Pose, Scan, Vec3};
+use crate::geometry::{Pose, Scan, StereoModel, Vec3};
 use rand::RngExt;
 use rayon::prelude::*;
 
-/// Columns and rows of the grid.
-const GRID: [usize; 2] = [320, 240];
-/// Columns and rows of the images, pixels.
-const IMAGE: [f64; 2] = [1292.0, 964.0];
-/// Horizontal field of view, degrees.
-const FIELD_OF_VIEW: f64 = 40.0;
-/// Metres.
-const BASELINE: f64 = 0.1;
+/// The pair that is simulated.
+const MODEL: StereoModel = StereoModel::GUPPY;
+const GRID: [usize; 2] = MODEL.grid;
+const IMAGE: [f64; 2] = MODEL.image;
+const BASELINE: f64 = MODEL.baseline;
 /// Standard deviation of the disparity seen head on, pixels of the image: white, and correlated over the
 /// matching window.
 const WHITE: f64 = 0.25;
@@ -46,27 +43,29 @@ const TAIL: f64 = 20e-3;
 /// Incidence from which on points drop out, and past which there are none, degrees.
 const DROP_OUT: [f64; 2] = [50.0, 75.0];
 
-/// From the cameras to the object's middle, metres; large objects are kept off by three radii.
-pub(crate) fn distance(scene: &Scene, params: &SimulateParams) -> f64 {
-    params.stereo_distance.max(3.0 * scene.radius())
+/// The pair for an object; large ones are kept off by three radii.
+pub(crate) fn model_for(scene: &Scene, params: &SimulateParams) -> StereoModel {
+    StereoModel {
+        working_distance: params.stereo_distance.max(3.0 * scene.radius()),
+        range: [0.0, f64::INFINITY],
+        ..MODEL
+    }
 }
 
 /// Focal length, pixels of the image.
 fn focal_length() -> f64 {
-    IMAGE[0] / 2.0 / (FIELD_OF_VIEW.to_radians() / 2.0).tan()
+    MODEL.focal_length()
 }
 
 /// The ray of a pixel of the grid, scaled to z = 1.
 fn ray(index: usize) -> Vec3 {
-    let offset = |at: usize, i: usize| ((at as f64 + 0.5) / GRID[i] as f64 - 0.5) * IMAGE[i];
-    let (x, y) = (offset(index % GRID[0], 0), offset(index / GRID[0], 1));
-    Vec3::new(x / focal_length(), y / focal_length(), 1.0)
+    MODEL.ray((index % GRID[0]) as f64, (index / GRID[0]) as f64)
 }
 
 /// One pair of images from `object_from_sensor`: the scan, labels and noise-free hits.
 pub(crate) fn scan(
     scene: &Scene,
-    params: &SimulateParams,
+    model: &StereoModel,
     object_from_sensor: &Pose,
     dice: Dice,
 ) -> (Scan, Vec<u8>, Vec<[f32; 3]>) {
@@ -81,7 +80,8 @@ pub(crate) fn scan(
     let matcher = Matcher {
         hits: &hits,
         drift: correlated(dice, GRID[0], GRID[1], CORRELATION_LENGTH),
-        middle: distance(scene, params),
+        middle: model.working_distance,
+        range: model.range,
         reach: scene.radius() + OUTLIER_MARGIN,
     };
     let rows: Vec<Vec<([f32; 3], u8)>> =
@@ -103,6 +103,8 @@ struct Matcher<'a> {
     /// Outliers lie within `reach` of this depth, metres.
     middle: f64,
     reach: f64,
+    /// Nearest and farthest depth, metres.
+    range: [f64; 2],
 }
 
 impl Matcher<'_> {
@@ -115,7 +117,7 @@ impl Matcher<'_> {
                 return none;
             }
             let edge = edge(self.hits, GRID[0], index, EDGE);
-            let (mut depth, mut label) = (hit.depth, GOOD);
+            let (mut depth, mut label) = (hit.depth, hit.label());
             if rng.random_bool(OUTLIERS) {
                 depth = self.middle + rng.random_range(-1.0..1.0) * self.reach;
                 label = OUTLIER;
@@ -126,10 +128,11 @@ impl Matcher<'_> {
             let noise = WHITE * normal(&mut rng) + CORRELATED * self.drift[index];
             let disparity = focal_length() * BASELINE / depth + noise / hit.cosine.powf(SLANT);
             let disparity = (disparity / QUANTUM).round() * QUANTUM;
-            if disparity < LEAST_DISPARITY {
+            let measured = focal_length() * BASELINE / disparity;
+            if disparity < LEAST_DISPARITY || !(self.range[0]..=self.range[1]).contains(&measured) {
                 return none;
             }
-            (f32s(&(ray(index) * (focal_length() * BASELINE / disparity))), label)
+            (f32s(&(ray(index) * measured)), label)
         };
         (row * GRID[0]..(row + 1) * GRID[0]).map(&mut measure).collect()
     }

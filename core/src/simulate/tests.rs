@@ -184,3 +184,28 @@ fn surface_error_of_the_raw_points() {
         }
     }
 }
+
+#[test]
+fn what_stands_round_the_object_is_seen_labelled_and_hides_it() {
+    let object = slab(0.05, 0.05, 0.05);
+    let mut table = slab(0.6, 0.6, 0.02);
+    table.vertices.iter_mut().for_each(|v| v.z -= 0.05);
+    let sensor = SensorModel::Striper(crate::geometry::StriperModel::SCANCONTROL);
+    let simulator =
+        Simulator::with_surroundings(&object, &table, sensor, NoiseFamily::P2K, 1).unwrap();
+    let reported = above(0.3, 40.0);
+    let view = simulator.scan_at(0, &reported);
+    assert_eq!(view.reported_pose, reported);
+    assert_ne!(view.true_pose, reported);
+    let count = |label: u8| view.scan.returns().filter(|&i| view.labels[i] == label).count();
+    assert!(count(GOOD) > 5_000 && count(SURROUNDINGS) > 20_000);
+    for i in view.scan.returns().filter(|&i| view.labels[i] == SURROUNDINGS) {
+        let hit = nalgebra::Point3::from(view.hits[i].map(f64::from));
+        assert!((view.true_pose * hit).z < -0.0499);
+    }
+    let bits =
+        |v: &SimulatedView| v.scan.points.as_flattened().iter().map(|c| c.to_bits()).collect();
+    let (again, first): (Vec<u32>, Vec<u32>) =
+        (bits(&simulator.scan_at(0, &reported)), bits(&view));
+    assert!(again == first);
+}

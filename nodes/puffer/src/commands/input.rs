@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use puffer_core::Error;
 use puffer_core::mesh::io::Unit;
 use puffer_core::pipeline::{Input, Poses};
-use puffer_core::scans::ScanFiles;
+use puffer_core::scans::ScanSource;
 use std::path::{Path, PathBuf};
 
 /// The data to work on.
@@ -46,7 +46,7 @@ impl InputArgs {
     }
 
     /// Opens the data, which must be scans.
-    pub(crate) fn open_scans(&self) -> Result<ScanFiles> {
+    pub(crate) fn open_scans(&self) -> Result<ScanSource> {
         match self.open()? {
             Input::Scans(files) => Ok(files),
             Input::Cloud(_) => Err(usage(format!(

@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use puffer_core::mesh::io::write_mesh;
 use puffer_core::mesh::{Mesh, components, genus, is_closed, is_oriented, is_two_manifold};
-use puffer_core::pipeline::{Outcome, run};
+use puffer_core::pipeline::{Outcome, comments, run};
 use puffer_core::register::Status;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -40,11 +40,7 @@ impl Reconstruct {
         let outcome =
             self.input.named(run(&input, self.input.poses(), &params, watch.progress()))?;
         let times = watch.finish();
-        let comments = [
-            format!("puffer {}", env!("CARGO_PKG_VERSION")),
-            format!("seed {}", self.seed),
-            format!("input sha256 {}", outcome.hash),
-        ];
+        let comments = comments(&outcome.cloud, self.seed);
         write_mesh(&self.output, &outcome.mesh, &comments)?;
         self.report(&outcome, &times).print(self.json);
         Ok(())

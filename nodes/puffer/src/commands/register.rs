@@ -44,7 +44,7 @@ impl Register {
         let times = watch.finish();
         let extras: Vec<Value> =
             registration.verdicts.iter().map(|v| json!({ "verdict": verdict_json(v) })).collect();
-        write_poses(&self.output, files.source(), self.input.unit(), &registration.poses, &extras)?;
+        write_poses(&self.output, &files, &registration.poses, &extras)?;
         let mut report = Report::default();
         for (i, verdict) in registration.verdicts.iter().enumerate() {
             let xi = log(&(prepared.robot[i].inverse() * registration.poses[i]));

@@ -9,7 +9,9 @@ use puffer_core::geometry::{Cloud, Surface, Vec3};
 use puffer_core::mesh::Mesh;
 use puffer_core::mesh::io::{Unit, read_mesh, write_cloud, write_mesh};
 use puffer_core::params::ParamValue;
-use puffer_core::scans::{ScanSet, SensorKind, View, write_poses, write_scans};
+use puffer_core::scans::{
+    ScanSet, ScanSource, SensorKind, Support, View, write_poses, write_scans,
+};
 use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, objects, simulate};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -118,11 +120,13 @@ fn write(dir: &Path, truth_dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> 
         views: scans.views.iter().enumerate().map(view).collect(),
         sensor: Some(sensor),
         pose_sigma: Some(scans.pose_sigma),
+        support: Support::None,
         nominal: Value::Null,
     };
     write_scans(dir, &set, &[])?;
     let true_poses: Vec<_> = scans.views.iter().map(|v| v.true_pose).collect();
-    write_poses(&truth_dir.join("poses.json"), dir, Unit::M, &true_poses, &[])?;
+    let written = ScanSource::open(dir, Unit::M)?;
+    write_poses(&truth_dir.join("poses.json"), &written, &true_poses, &[])?;
     write_mesh(&truth_dir.join("truth.ply"), truth, &[])?;
     write_cloud(&truth_dir.join("seen.ply"), &seen(truth, scans)?, &[])?;
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::cloud::{Frame, parse_scan};
 use super::document::{self, Entry, Parsed};
-use super::{PoseSigma, ScanSet, SensorKind, Unit, View, conf};
+use super::{PoseSigma, ScanSet, SensorKind, Support, Unit, View, conf};
 use crate::geometry::Pose;
 use crate::mesh::io::read_bytes;
 use crate::{Error, Result};
@@ -12,35 +12,47 @@ use std::path::{Path, PathBuf};
 
 const POSES: &str = "poses.json";
 
-/// Scans whose poses are known and whose points are still in their files, for those who take view by view.
-pub struct ScanFiles {
+/// Scans whose poses are known, for those who take view by view: points in files stay there until they are asked for.
+pub struct ScanSource {
+    store: Store,
+    /// The noise family, if it is known.
+    pub sensor: Option<SensorKind>,
+    /// How uncertain the poses are, if it is known.
+    pub pose_sigma: Option<PoseSigma>,
+    /// What the object stands on.
+    pub support: Support,
+    /// Sensor figures as they stand in the file; null if there are none.
+    pub nominal: Value,
+}
+
+enum Store {
+    Files(Files),
+    Memory(Vec<View>),
+}
+
+struct Files {
+    /// The file with the poses.
     source: PathBuf,
     /// Folder of the clouds.
     folder: PathBuf,
     unit: Unit,
     entries: Vec<Entry>,
     frame: Frame,
-    /// The noise family, if it is known.
-    pub sensor: Option<SensorKind>,
-    /// How uncertain the poses are, if it is known.
-    pub pose_sigma: Option<PoseSigma>,
-    /// Sensor figures as they stand in the file; null if there are none.
-    pub nominal: Value,
 }
 
-impl ScanFiles {
+impl ScanSource {
     /// Opens a scan folder, its `poses.json`, or a Stanford `*.conf`; the lengths in them (points, poses,
     /// `pose_sigma`) are in `unit`.
     ///
     /// # Errors
     /// [`Error::Io`] if a file cannot be read or a view's cloud is missing, [`Error::Format`] with the view's
     /// name if something does not fit the format.
-    pub fn open(path: &Path, unit: Unit) -> Result<ScanFiles> {
+    pub fn open(path: &Path, unit: Unit) -> Result<ScanSource> {
         let (document, source) = read_document(path)?;
         let parsed = document::parse(&document, &source, unit)?;
-        let Parsed { entries, frame, sensor, pose_sigma, nominal, clouds_in } = parsed;
+        let Parsed { entries, frame, sensor, pose_sigma, support, nominal, clouds_in } = parsed;
         let folder = source.with_file_name("").join(clouds_in);
-        let files = ScanFiles { source, folder, unit, entries, frame, sensor, pose_sigma, nominal };
+        let files = Files { source, folder, unit, entries, frame };
         for (index, entry) in files.entries.iter().enumerate() {
             let cloud = files.cloud_path(index);
             if !cloud.is_file() {
@@ -52,35 +64,67 @@ impl ScanFiles {
                 return Err(Error::format(&files.source, message));
             }
         }
-        Ok(files)
+        Ok(ScanSource { store: Store::Files(files), sensor, pose_sigma, support, nominal })
+    }
+
+    /// Scans that are in memory already.
+    pub fn of(set: ScanSet) -> ScanSource {
+        let ScanSet { views, sensor, pose_sigma, support, nominal } = set;
+        ScanSource { store: Store::Memory(views), sensor, pose_sigma, support, nominal }
     }
 
     /// Number of views.
     pub fn len(&self) -> usize {
-        self.entries.len()
+        match &self.store {
+            Store::Files(files) => files.entries.len(),
+            Store::Memory(views) => views.len(),
+        }
     }
 
-    /// Whether there is no view; never so after [`ScanFiles::open`].
+    /// Whether there is no view; never so after [`ScanSource::open`].
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.len() == 0
     }
 
     /// Name of view `index`.
     pub fn name(&self, index: usize) -> &str {
-        &self.entries[index].name
+        match &self.store {
+            Store::Files(files) => &files.entries[index].name,
+            Store::Memory(views) => &views[index].name,
+        }
     }
 
     /// The pose object_from_sensor of view `index`, metres.
     pub fn pose(&self, index: usize) -> Pose {
-        self.entries[index].object_from_sensor
+        match &self.store {
+            Store::Files(files) => files.entries[index].object_from_sensor,
+            Store::Memory(views) => views[index].object_from_sensor,
+        }
     }
 
-    /// Reads view `index`, in metres.
+    /// View `index`, in metres.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Format`] if its cloud cannot be read, is malformed, holds no finite point, or
     /// seems to be in another unit.
     pub fn view(&self, index: usize) -> Result<View> {
+        match &self.store {
+            Store::Files(files) => files.view(index),
+            Store::Memory(views) => Ok(views[index].clone()),
+        }
+    }
+
+    /// The file that holds the poses and the unit of its lengths, if they came from one.
+    pub(super) fn file(&self) -> Option<(&Path, Unit)> {
+        match &self.store {
+            Store::Files(files) => Some((&files.source, files.unit)),
+            Store::Memory(_) => None,
+        }
+    }
+}
+
+impl Files {
+    fn view(&self, index: usize) -> Result<View> {
         let entry = &self.entries[index];
         let path = self.cloud_path(index);
         let scan = parse_scan(&read_bytes(&path)?, &path, self.frame, self.unit, entry.width)
@@ -94,11 +138,6 @@ impl ScanFiles {
         Ok(View { name: entry.name.clone(), scan, object_from_sensor })
     }
 
-    /// The file that holds the poses.
-    pub fn source(&self) -> &Path {
-        &self.source
-    }
-
     fn cloud_path(&self, index: usize) -> PathBuf {
         self.folder.join(&self.entries[index].cloud)
     }
@@ -108,9 +147,9 @@ impl ScanFiles {
 /// those of the result in metres. Range grids are turned into our sensor frame, with parallel rays.
 ///
 /// # Errors
-/// As [`ScanFiles::open`] and [`ScanFiles::view`].
+/// As [`ScanSource::open`] and [`ScanSource::view`].
 pub fn read_scans(path: &Path, unit: Unit) -> Result<ScanSet> {
-    let files = ScanFiles::open(path, unit)?;
+    let files = ScanSource::open(path, unit)?;
     let views = (0..files.len()).into_par_iter().map(|i| files.view(i));
     // Collected whole first: the error told is that of the first view, whatever thread was faster.
     let views: Vec<Result<View>> = views.collect();
@@ -118,6 +157,7 @@ pub fn read_scans(path: &Path, unit: Unit) -> Result<ScanSet> {
         views: views.into_iter().collect::<Result<_>>()?,
         sensor: files.sensor,
         pose_sigma: files.pose_sigma,
+        support: files.support,
         nominal: files.nominal,
     })
 }

@@ -1,0 +1,136 @@
+//! Registration of scans as they come.
+
+use super::joint::Sample;
+use super::stages::{place, waiting};
+use super::verdict::{Status, Verdict};
+use super::{PoseSigma, PreparedScan, RegisterParams, Registration, align::Map, register_samples};
+use crate::geometry::Pose;
+use crate::{Progress, Result};
+
+/// Takes scans one by one: each is aligned to those accepted before it, and those put aside are tried again
+/// whenever the map has grown (Wiedemann 2014, §2.3.1).
+pub struct Registrar {
+    params: RegisterParams,
+    pose_sigma: PoseSigma,
+    samples: Vec<Sample>,
+    robot: Vec<Pose>,
+    tries: Vec<usize>,
+    poses: Vec<Pose>,
+    verdicts: Vec<Verdict>,
+    map: Option<Map>,
+}
+
+impl Registrar {
+    /// A registrar without scans; `pose_sigma` is the robot's.
+    pub fn new(pose_sigma: PoseSigma, params: RegisterParams) -> Registrar {
+        Registrar {
+            params,
+            pose_sigma,
+            samples: Vec::new(),
+            robot: Vec::new(),
+            tries: Vec::new(),
+            poses: Vec::new(),
+            verdicts: Vec::new(),
+            map: None,
+        }
+    }
+
+    /// Number of scans taken.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Whether no scan was taken yet.
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// Estimated pose `object_from_sensor` of scan `index`.
+    pub fn pose(&self, index: usize) -> Pose {
+        self.poses[index]
+    }
+
+    /// What became of scan `index`.
+    pub fn verdict(&self, index: usize) -> &Verdict {
+        &self.verdicts[index]
+    }
+
+    /// Takes a scan with the robot's pose `object_from_sensor`. Returns the scans whose pose or verdict is new, this
+    /// one first; others had been put aside and were placed now.
+    pub fn add(&mut self, scan: &PreparedScan, robot: &Pose) -> Vec<usize> {
+        let sample = Sample::new(scan, self.params.samples);
+        let index = self.samples.len();
+        self.robot.push(*robot);
+        self.poses.push(*robot);
+        self.tries.push(0);
+        self.verdicts.push(waiting(self.pose_sigma));
+        if self.map.is_none() {
+            self.verdicts[index].status = Status::Accepted;
+            let mut map = Map::new(sample.target_spacing);
+            sample.add_to(&mut map, robot);
+            self.map = Some(map);
+            self.samples.push(sample);
+            return vec![index];
+        }
+        self.samples.push(sample);
+        let mut changed = vec![index];
+        if self.try_to_place(index) {
+            changed.extend(self.retry());
+        }
+        changed
+    }
+
+    /// Tries all that were put aside until none can be placed.
+    fn retry(&mut self) -> Vec<usize> {
+        let mut placed = Vec::new();
+        loop {
+            let waiting: Vec<usize> = (0..self.samples.len())
+                .filter(|&i| self.verdicts[i].status == Status::Deferred)
+                .filter(|&i| self.tries[i] < self.params.max_rounds)
+                .collect();
+            let found: Vec<usize> = waiting.into_iter().filter(|&i| self.try_to_place(i)).collect();
+            if found.is_empty() {
+                return placed;
+            }
+            placed.extend(found);
+        }
+    }
+
+    fn try_to_place(&mut self, index: usize) -> bool {
+        let Some(map) = &mut self.map else { return false };
+        self.tries[index] += 1;
+        let sample = &self.samples[index];
+        let (pose, verdict) = place(sample, map, &self.robot[index], self.pose_sigma, &self.params);
+        let accepted = verdict.status == Status::Accepted;
+        self.verdicts[index] = verdict;
+        if accepted {
+            self.poses[index] = pose;
+            sample.add_to(map, &pose);
+        }
+        accepted
+    }
+
+    /// Registers all scans anew and together, as [`super::register`] does; the result is what counts from now on.
+    ///
+    /// # Errors
+    /// As [`super::register`].
+    pub fn refine(&mut self, progress: &Progress) -> Result<Registration> {
+        let registration = register_samples(
+            &self.samples,
+            &self.robot,
+            Some(self.pose_sigma),
+            &self.params,
+            progress,
+        )?;
+        self.poses.clone_from(&registration.poses);
+        self.verdicts.clone_from(&registration.verdicts);
+        let mut map = Map::new(self.samples[0].target_spacing);
+        for (i, sample) in self.samples.iter().enumerate() {
+            if self.verdicts[i].status == Status::Accepted {
+                sample.add_to(&mut map, &self.poses[i]);
+            }
+        }
+        self.map = Some(map);
+        Ok(registration)
+    }
+}

@@ -1,0 +1,3 @@
+//! Tests of the robot as a whole.
+
+use super::*;

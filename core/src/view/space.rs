@@ -1,0 +1,360 @@
+//! What is known of each voxel.
+
+use super::ViewParams;
+use super::carve::{Carved, carve};
+use super::look::{Eye, look};
+use crate::geometry::{Aabb, Pose, Scan, SensorModel, Vec3};
+use crate::voxel::{BlockGrid, SlotSet};
+use crate::{Error, Result};
+
+/// State of a voxel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum State {
+    /// Nothing is known.
+    #[default]
+    Unknown,
+    /// Between the sensor and a measured surface.
+    Free,
+    /// A surface was measured.
+    Occupied,
+    /// Behind a measured surface, seen from every view so far.
+    PossibleInside,
+    /// Between unknown and possible inside.
+    PossibleBorder,
+    /// Known to be solid (gripper, table): stops rays, and asks for nothing.
+    Excluded,
+}
+
+/// Evidence and state of a voxel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Cell {
+    /// Measured points of all scans.
+    pub points: u32,
+    /// Scans with points in it.
+    pub hits: u16,
+    /// Scans without, that saw through it well before a surface.
+    pub passes: u16,
+    /// Whether a ray went through it before its surface.
+    freed: bool,
+    /// Whether a ray would have gone through it behind its surface.
+    behind: bool,
+    /// Scans that looked at it in vain.
+    pub tries: u8,
+    /// Best cosine of incidence so far, 255 for 1.
+    pub quality: u8,
+    pub state: State,
+}
+
+/// Numbers of voxels by what is known of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Never seen, within the region of interest.
+    pub unknown: usize,
+    /// Seen through.
+    pub free: usize,
+    /// A surface was measured.
+    pub occupied: usize,
+    /// Occupied with at least the minimum of points.
+    pub satisfied: usize,
+    /// Behind a surface.
+    pub possible_inside: usize,
+    /// Between unknown and possible inside.
+    pub possible_border: usize,
+    /// Occupied without the minimum of points, and looked at in vain so often that they count as not measurable.
+    pub unmeasurable: usize,
+    /// Possible inside or border, and looked at in vain that often.
+    pub unresolved: usize,
+    /// Known to be solid.
+    pub excluded: usize,
+}
+
+/// The voxel space of the view planner (Wiedemann 2014, §2.1 and §2.2.1).
+pub struct ViewSpace {
+    pub(crate) grid: BlockGrid<Cell>,
+    pub(crate) params: ViewParams,
+    pub(crate) sensor: SensorModel,
+    roi: Aabb,
+    scans: usize,
+    /// Views from which a scan was taken in, and those that were marked.
+    used: Vec<Pose>,
+    marked: Vec<Pose>,
+}
+
+impl ViewSpace {
+    /// A space of unknown voxels.
+    ///
+    /// * `sensor` - whose scans come in and are planned
+    /// * `roi` - the region of interest in the object frame, metres; nothing outside is planned for
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the region is empty or holds too many voxels.
+    pub fn new(sensor: SensorModel, roi: Aabb, params: &ViewParams) -> Result<ViewSpace> {
+        let grid = BlockGrid::new(&roi, params.edge(&sensor))?;
+        let (used, marked) = (Vec::new(), Vec::new());
+        Ok(ViewSpace { grid, params: params.clone(), sensor, roi, scans: 0, used, marked })
+    }
+
+    /// Marks voxels whose centres lie in one of `boxes` (object frame, metres) as known to be solid. They stop rays, ask
+    /// for nothing and give no directions; points in them are ignored.
+    pub fn exclude(&mut self, boxes: &[Aabb]) {
+        self.exclude_where(|center| boxes.iter().any(|b| b.contains(center)));
+    }
+
+    /// Marks all below the plane z = `height` (object frame, metres) as known to be solid: the object stands on it.
+    pub fn exclude_below(&mut self, height: f64) {
+        self.exclude_where(|center| center.z < height);
+    }
+
+    /// Marks voxels whose centres `solid` says to be solid, as [`ViewSpace::exclude`] does.
+    pub fn exclude_where(&mut self, solid: impl Fn(&Vec3) -> bool) {
+        for slot in 0..self.grid.slots() as u32 {
+            if self.grid.slot(self.grid.voxel(slot)).is_some() && solid(&self.grid.center(slot)) {
+                *self.grid.get_mut(slot) = Cell { state: State::Excluded, ..Cell::default() };
+            }
+        }
+    }
+
+    /// Takes in a scan (sensor frame) from `object_from_sensor`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the pose is not finite or the scan's vectors differ in length.
+    pub fn integrate(&mut self, scan: &Scan, object_from_sensor: &Pose) -> Result<()> {
+        check(scan, object_from_sensor)?;
+        let carved = carve(&self.grid, scan, object_from_sensor, self.params.min_support);
+        self.apply(&carved);
+        self.judge();
+        self.scans += 1;
+        self.used.push(*object_from_sensor);
+        self.note_looks(&carved, object_from_sensor);
+        Ok(())
+    }
+
+    /// Forgets all scans and takes in these, with their corrected poses. Solid space and marked views are kept.
+    ///
+    /// # Errors
+    /// As [`ViewSpace::integrate`]; the space then holds the scans before the faulty one.
+    pub fn rebuild(&mut self, scans: &[(&Scan, Pose)]) -> Result<()> {
+        let mut grid = BlockGrid::new(&self.roi, self.grid.edge())?;
+        for (slot, cell) in self.grid.iter() {
+            if cell.state == State::Excluded {
+                *grid.get_mut(slot) = *cell;
+            }
+        }
+        (self.grid, self.scans) = (grid, 0);
+        self.used.clear();
+        scans.iter().try_for_each(|(scan, pose)| self.integrate(scan, pose))
+    }
+
+    /// Remembers a view as used although no scan of it was taken in (it failed, or could not be registered).
+    pub fn mark_used(&mut self, object_from_sensor: &Pose) {
+        self.marked.push(*object_from_sensor);
+    }
+
+    /// Number of scans taken in.
+    pub fn scans(&self) -> usize {
+        self.scans
+    }
+
+    /// Edge of a voxel, metres.
+    pub fn edge(&self) -> f64 {
+        self.grid.edge()
+    }
+
+    /// The region of interest, object frame, metres.
+    pub fn roi(&self) -> &Aabb {
+        &self.roi
+    }
+
+    /// Bytes that the voxels take.
+    pub fn memory(&self) -> usize {
+        self.grid.memory()
+    }
+
+    /// State of the voxel at `point` (object frame, metres); `None` outside the region of interest.
+    pub fn state_at(&self, point: &Vec3) -> Option<State> {
+        Some(self.grid.get(self.grid.slot_at(point)?).state)
+    }
+
+    /// Centres (object frame, metres) and states of all voxels that are neither unknown nor free, in a fixed order, and for
+    /// each whether it is satisfied (occupied with its minimum of points).
+    pub fn voxels(&self) -> Vec<(Vec3, State, bool)> {
+        let told = |cell: &Cell| !matches!(cell.state, State::Unknown | State::Free);
+        let told = self.grid.iter().filter(|(_, cell)| told(cell));
+        told.map(|(slot, cell)| (self.grid.center(slot), cell.state, self.satisfied(cell)))
+            .collect()
+    }
+
+    /// Numbers of voxels by what is known of them.
+    pub fn counts(&self) -> Counts {
+        let mut counts = Counts::default();
+        for (_, cell) in self.grid.iter() {
+            let given_up = self.given_up(cell);
+            match cell.state {
+                State::Unknown => {}
+                State::Free => counts.free += 1,
+                State::Occupied => {
+                    counts.occupied += 1;
+                    counts.satisfied += usize::from(self.satisfied(cell));
+                    counts.unmeasurable += usize::from(given_up && !self.satisfied(cell));
+                }
+                State::PossibleInside => counts.possible_inside += 1,
+                State::PossibleBorder => counts.possible_border += 1,
+                State::Excluded => counts.excluded += 1,
+            }
+            let hidden = matches!(cell.state, State::PossibleInside | State::PossibleBorder);
+            counts.unresolved += usize::from(hidden && given_up);
+        }
+        let hidden = counts.possible_inside + counts.possible_border;
+        let told = counts.free + counts.occupied + hidden + counts.excluded;
+        counts.unknown = self.grid.voxels() - told;
+        counts
+    }
+
+    /// Poses of all views that are not to be repeated.
+    pub(crate) fn used(&self) -> impl Iterator<Item = &Pose> {
+        self.used.iter().chain(&self.marked)
+    }
+
+    fn satisfied(&self, cell: &Cell) -> bool {
+        cell.state == State::Occupied && cell.points as usize >= self.params.min_points
+    }
+
+    fn given_up(&self, cell: &Cell) -> bool {
+        usize::from(cell.tries) >= self.params.max_tries
+    }
+
+    /// Whether a voxel is one of N: a surface that lacks points and may still get them.
+    pub(crate) fn lacks_points(&self, cell: &Cell) -> bool {
+        cell.state == State::Occupied && !self.satisfied(cell) && !self.given_up(cell)
+    }
+
+    /// Whether a voxel is one of M: hidden so far, and not looked at in vain too often.
+    pub(crate) fn hides(&self, cell: &Cell) -> bool {
+        matches!(cell.state, State::PossibleInside | State::PossibleBorder) && !self.given_up(cell)
+    }
+
+    /// Middle of the surface measured so far, object frame, metres; that of the region of interest if there is none. The
+    /// outermost fiftieth on each side is left out as likely noise.
+    pub(crate) fn middle(&self) -> Vec3 {
+        let occupied = self.grid.iter().filter(|(_, cell)| cell.state == State::Occupied);
+        let centers: Vec<Vec3> = occupied.map(|(slot, _)| self.grid.center(slot)).collect();
+        if centers.is_empty() {
+            return self.roi.center();
+        }
+        Vec3::from_fn(|axis, _| {
+            let mut along: Vec<f64> = centers.iter().map(|c| c[axis]).collect();
+            along.sort_unstable_by(f64::total_cmp);
+            let cut = along.len() / 50;
+            (along[cut] + along[along.len() - 1 - cut]) / 2.0
+        })
+    }
+
+    fn apply(&mut self, carved: &Carved) {
+        for &(slot, points) in &carved.hits {
+            let cell = self.grid.get_mut(slot);
+            if cell.state != State::Excluded {
+                cell.points = cell.points.saturating_add(points);
+                cell.hits = cell.hits.saturating_add(1);
+            }
+        }
+        for slot in carved.freed.iter() {
+            let cell = self.grid.get_mut(slot);
+            cell.freed = true;
+            if carved.passed.contains(slot) && !carved.hit.contains(slot) {
+                cell.passes = cell.passes.saturating_add(1);
+            }
+        }
+        for slot in carved.behind.iter() {
+            self.grid.get_mut(slot).behind = true;
+        }
+    }
+
+    /// Sets all states from the evidence: occupied before free before possible inside before possible border.
+    fn judge(&mut self) {
+        let slots: Vec<u32> = self.grid.iter().map(|(slot, _)| slot).collect();
+        let mut hidden = Vec::new();
+        for slot in slots {
+            let hit_weight = self.params.hit_weight;
+            let cell = self.grid.get_mut(slot);
+            let surface =
+                cell.hits > 0 && f64::from(cell.passes) <= hit_weight * f64::from(cell.hits);
+            let state = match cell.state {
+                State::Excluded => State::Excluded,
+                _ if surface => State::Occupied,
+                _ if cell.freed => State::Free,
+                _ if cell.behind => State::PossibleInside,
+                // Whether it still is a border is seen below.
+                old => old,
+            };
+            if state == State::PossibleInside {
+                hidden.push(slot);
+            }
+            if state != cell.state {
+                cell.tries = if state == State::PossibleInside { cell.tries } else { 0 };
+                cell.state = state;
+            }
+        }
+        self.find_borders(&hidden);
+    }
+
+    fn find_borders(&mut self, hidden: &[u32]) {
+        let mut borders = SlotSet::new(self.grid.slots());
+        for &slot in hidden {
+            for next in self.grid.neighbours(slot) {
+                let state = self.grid.get(next).state;
+                if matches!(state, State::Unknown | State::PossibleBorder) {
+                    borders.insert(next);
+                }
+            }
+        }
+        let old = self.grid.iter().filter(|(_, cell)| cell.state == State::PossibleBorder);
+        let gone: Vec<u32> = old.map(|(slot, _)| slot).filter(|s| !borders.contains(*s)).collect();
+        for slot in gone {
+            self.grid.get_mut(slot).state = State::Unknown;
+        }
+        for slot in borders.iter() {
+            self.grid.get_mut(slot).state = State::PossibleBorder;
+        }
+    }
+
+    /// Looks at the space from where the scan was taken: what still asks there was looked at in vain, unless it got points.
+    /// Only what a candidate's simulated scan would count gets a try, so that no view can gain for ever.
+    fn note_looks(&mut self, carved: &Carved, pose: &Pose) {
+        let eye = Eye::new(&self.sensor, self.edge() / 2.0);
+        let mut seen = SlotSet::new(self.grid.slots());
+        let (mut vain, mut measured) = (Vec::new(), Vec::new());
+        look(self, &eye, pose, &mut seen, |slot, cell, along| {
+            if cell.state == State::Occupied && carved.hit.contains(slot) {
+                measured.push((slot, *along));
+            } else if self.lacks_points(cell) || self.hides(cell) {
+                vain.push(slot);
+            }
+        });
+        for slot in vain {
+            let cell = self.grid.get_mut(slot);
+            cell.tries = cell.tries.saturating_add(1);
+        }
+        for (slot, along) in measured {
+            let Some(normal) = super::candidates::outward(self, slot) else { continue };
+            let quality = (-along.dot(&normal)).clamp(0.0, 1.0) * 255.0;
+            let cell = self.grid.get_mut(slot);
+            cell.quality = cell.quality.max(quality as u8);
+        }
+    }
+}
+
+fn check(scan: &Scan, pose: &Pose) -> Result<()> {
+    if !pose.to_homogeneous().iter().all(|v| v.is_finite()) {
+        return Err(Error::input(
+            "the scan's pose holds numbers that are not finite: leave it out",
+        ));
+    }
+    if !scan.origins.is_empty() && scan.origins.len() != scan.points.len() {
+        return Err(Error::input(format!(
+            "the scan has {} points but {} ray origins; it needs one a point or none at all",
+            scan.points.len(),
+            scan.origins.len()
+        )));
+    }
+    Ok(())
+}

@@ -1,0 +1,54 @@
+//! The full text of a type as bags store it (schema encoding `ros2msg`): its own text, and those of all types that
+//! it contains, each below a line of `=` and its name.
+
+use crate::model::{MessageName, Part};
+use crate::tree::{Tree, nested};
+
+const LINE: &str =
+    "================================================================================";
+
+/// The text of a part and of everything in it.
+pub(crate) fn full(tree: &Tree, part: &Part) -> String {
+    let mut out = part.text.clone();
+    append_nested(tree, part, &mut Vec::new(), &mut out);
+    out.push('\n');
+    out
+}
+
+/// The text of an action's feedback message: goal id and feedback.
+pub(crate) fn feedback(tree: &Tree, package: &str, action: &str, feedback: &Part) -> String {
+    let id = MessageName { package: "unique_identifier_msgs".into(), name: "UUID".into() };
+    let name = MessageName { package: package.into(), name: format!("{action}_Feedback") };
+    let mut out = format!("{}/{} goal_id\n{}/{} feedback", id.package, id.name, package, name.name);
+    let mut seen = Vec::new();
+    if let Some(part) = tree.message(&id) {
+        section(&id, &part.text, &mut out);
+        seen.push(&id);
+    }
+    section(&name, &feedback.text, &mut out);
+    append_nested(tree, feedback, &mut seen, &mut out);
+    out.push('\n');
+    out
+}
+
+fn append_nested<'a>(
+    tree: &'a Tree,
+    part: &'a Part,
+    seen: &mut Vec<&'a MessageName>,
+    out: &mut String,
+) {
+    for name in nested(part) {
+        if seen.contains(&name) {
+            continue;
+        }
+        seen.push(name);
+        if let Some(inner) = tree.message(name) {
+            section(name, &inner.text, out);
+            append_nested(tree, inner, seen, out);
+        }
+    }
+}
+
+fn section(name: &MessageName, text: &str, out: &mut String) {
+    out.push_str(&format!("\n{LINE}\nMSG: {}/{}\n{text}", name.package, name.name));
+}

@@ -1,0 +1,100 @@
+//! Stamps and durations as numbers.
+
+use crate::builtin_interfaces::msg::{Duration, Time};
+
+const BILLION: i64 = 1_000_000_000;
+
+/// Whole seconds and the nanoseconds above them; seconds beyond 32 bits are cut off at the limit.
+fn split(nanoseconds: i64) -> (i32, u32) {
+    let seconds = nanoseconds.div_euclid(BILLION);
+    match i32::try_from(seconds) {
+        Ok(seconds) => (seconds, nanoseconds.rem_euclid(BILLION) as u32),
+        Err(_) if seconds < 0 => (i32::MIN, 0),
+        Err(_) => (i32::MAX, BILLION as u32 - 1),
+    }
+}
+
+/// Seconds as whole nanoseconds; what is too large is cut off, NaN is 0. The product of a present-day stamp and a
+/// billion would lose 100 ns, so whole seconds go apart.
+fn nanoseconds_of(seconds: f64) -> i64 {
+    let whole = seconds.floor();
+    let rest = ((seconds - whole) * BILLION as f64).round() as i64;
+    (whole as i64).saturating_mul(BILLION).saturating_add(rest)
+}
+
+impl Time {
+    /// From nanoseconds since the epoch; what 32 bits of seconds cannot hold is cut off at the limit.
+    pub fn from_nanoseconds(nanoseconds: i64) -> Self {
+        let (sec, nanosec) = split(nanoseconds);
+        Time { sec, nanosec }
+    }
+
+    /// Nanoseconds since the epoch.
+    pub fn nanoseconds(&self) -> i64 {
+        i64::from(self.sec) * BILLION + i64::from(self.nanosec)
+    }
+
+    /// From seconds since the epoch.
+    pub fn from_seconds(seconds: f64) -> Self {
+        Time::from_nanoseconds(nanoseconds_of(seconds))
+    }
+
+    /// Seconds since the epoch.
+    pub fn seconds(&self) -> f64 {
+        f64::from(self.sec) + f64::from(self.nanosec) / BILLION as f64
+    }
+}
+
+impl Duration {
+    /// From nanoseconds; what 32 bits of seconds cannot hold is cut off at the limit.
+    pub fn from_nanoseconds(nanoseconds: i64) -> Self {
+        let (sec, nanosec) = split(nanoseconds);
+        Duration { sec, nanosec }
+    }
+
+    /// Nanoseconds.
+    pub fn nanoseconds(&self) -> i64 {
+        i64::from(self.sec) * BILLION + i64::from(self.nanosec)
+    }
+
+    /// From seconds.
+    pub fn from_seconds(seconds: f64) -> Self {
+        Duration::from_nanoseconds(nanoseconds_of(seconds))
+    }
+
+    /// Seconds.
+    pub fn seconds(&self) -> f64 {
+        f64::from(self.sec) + f64::from(self.nanosec) / BILLION as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_and_nanoseconds_are_the_same_both_ways() {
+        for nanoseconds in
+            [0, 1, 999_999_999, BILLION, 1_764_028_800 * BILLION + 5, -1, -BILLION - 7]
+        {
+            assert_eq!(Time::from_nanoseconds(nanoseconds).nanoseconds(), nanoseconds);
+            assert_eq!(Duration::from_nanoseconds(nanoseconds).nanoseconds(), nanoseconds);
+        }
+        assert_eq!(Time::from_nanoseconds(-1), Time { sec: -1, nanosec: 999_999_999 });
+    }
+
+    #[test]
+    fn what_does_not_fit_is_cut_off_at_the_limit() {
+        assert_eq!(Time::from_nanoseconds(i64::MAX), Time { sec: i32::MAX, nanosec: 999_999_999 });
+        assert_eq!(Duration::from_seconds(-1e12), Duration { sec: i32::MIN, nanosec: 0 });
+        assert_eq!(Duration::from_seconds(f64::NAN), Duration::default());
+    }
+
+    #[test]
+    fn seconds_keep_microseconds() {
+        let stamp = Time::from_seconds(1_764_028_800.25);
+        assert_eq!(stamp, Time { sec: 1_764_028_800, nanosec: 250_000_000 });
+        assert_eq!(Duration::from_seconds(-0.5), Duration { sec: -1, nanosec: 500_000_000 });
+        assert_eq!(Duration::from_seconds(-0.5).seconds(), -0.5);
+    }
+}

@@ -1,0 +1,97 @@
+//! Time stamps.
+
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+/// A point in time: nanoseconds since 1970, or since the start of a simulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Stamp(i64);
+
+impl Stamp {
+    /// The stamp of nanosecond 0, which ROS messages use for "no stamp".
+    pub const ZERO: Stamp = Stamp(0);
+
+    /// From nanoseconds.
+    pub const fn from_nanos(nanos: i64) -> Self {
+        Self(nanos)
+    }
+
+    /// From the two fields of a `builtin_interfaces/Time`, seconds and nanoseconds.
+    pub const fn new(sec: i32, nanosec: u32) -> Self {
+        Self(sec as i64 * 1_000_000_000 + nanosec as i64)
+    }
+
+    /// From seconds; saturates where nanoseconds do not fit 64 bits.
+    pub fn from_seconds(seconds: f64) -> Self {
+        Self((seconds * 1e9).round() as i64)
+    }
+
+    /// What the system's clock says.
+    pub fn wall() -> Self {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self(i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
+    }
+
+    /// As nanoseconds.
+    pub const fn nanos(self) -> i64 {
+        self.0
+    }
+
+    /// As seconds; exact to about 0.2 microseconds for today's wall time.
+    pub fn seconds(self) -> f64 {
+        self.0 as f64 * 1e-9
+    }
+
+    /// The two fields of a `builtin_interfaces/Time`; saturates outside of what 32 bits of seconds hold.
+    pub fn parts(self) -> (i32, u32) {
+        let seconds = self.0.div_euclid(1_000_000_000);
+        let nanos = self.0.rem_euclid(1_000_000_000) as u32;
+        match i32::try_from(seconds) {
+            Ok(seconds) => (seconds, nanos),
+            Err(_) if seconds < 0 => (i32::MIN, 0),
+            Err(_) => (i32::MAX, 999_999_999),
+        }
+    }
+
+    /// Seconds from `earlier` to this stamp, negative if it is later.
+    pub fn seconds_since(self, earlier: Stamp) -> f64 {
+        self.0.saturating_sub(earlier.0) as f64 * 1e-9
+    }
+}
+
+impl std::ops::Add<Duration> for Stamp {
+    type Output = Stamp;
+    fn add(self, duration: Duration) -> Stamp {
+        Stamp(self.0.saturating_add(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX)))
+    }
+}
+
+impl std::ops::Sub<Duration> for Stamp {
+    type Output = Stamp;
+    fn sub(self, duration: Duration) -> Stamp {
+        Stamp(self.0.saturating_sub(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX)))
+    }
+}
+
+impl std::fmt::Display for Stamp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (sec, nanosec) = self.parts();
+        write!(f, "{sec}.{nanosec:09}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stamp_keeps_its_nanoseconds_in_both_directions() {
+        for nanos in [0, 1, 999_999_999, 1_769_000_123_456_789_012, -1, -1_500_000_000] {
+            let stamp = Stamp::from_nanos(nanos);
+            let (sec, nanosec) = stamp.parts();
+            assert_eq!(Stamp::new(sec, nanosec), stamp);
+        }
+        assert_eq!(Stamp::from_nanos(-1_500_000_000).parts(), (-2, 500_000_000));
+        assert_eq!(Stamp::from_nanos(i64::MAX).parts(), (i32::MAX, 999_999_999));
+        assert_eq!(Stamp::from_nanos(1_500_000_000).to_string(), "1.500000000");
+    }
+}
