@@ -17,6 +17,7 @@
 
 mod action;
 mod args;
+pub mod bulk;
 pub mod convert;
 mod diagnostics;
 mod entry;
@@ -42,6 +43,3 @@ pub use stamp::Stamp;
 pub use stop::Stop;
 pub use tf::{TfBroadcaster, TfBuffer, TfError, Transform};
 pub use topic::{Publisher, Subscription};
-//! All ROS glue.
-
-pub mod bulk;
