@@ -9,7 +9,7 @@ use serde_json::Value;
 pub struct ParamSpec {
     /// Full name, `group.field`.
     pub name: String,
-    /// "float", "integer", "boolean" or "choice".
+    /// "float", "integer", "boolean", "string" or "choice".
     pub kind: &'static str,
     /// Value when the user gives none.
     pub default: Value,
@@ -105,6 +105,16 @@ pub trait Parameters: Clone + Default + Send + Sync + 'static {
             }
         }
         Ok(())
+    }
+}
+
+impl ParamValue for String {
+    const KIND: &'static str = "string";
+    fn to_value(&self) -> Value {
+        Value::from(self.as_str())
+    }
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_str().map(str::to_owned)
     }
 }
 

@@ -93,9 +93,7 @@ impl Solid {
                     UnitQuaternion::from_axis_angle(&Vec3::x_axis(), std::f64::consts::FRAC_PI_2);
                 (Body::Cylinder(Cylinder::new(half_length, radius)), turn)
             }
-            Shape::Sphere { radius } => {
-                (Body::Ball(Ball::new(radius)), UnitQuaternion::identity())
-            }
+            Shape::Sphere { radius } => (Body::Ball(Ball::new(radius)), UnitQuaternion::identity()),
         };
         let turn = Pose::from_parts(Translation3::identity(), turn);
         Solid { body, frame_from_body: frame_from_shape * turn, radius: shape.radius() }

@@ -93,8 +93,7 @@ impl Chain {
             let moves = if slides { axis } else { axis.cross(&(origin - at)) };
             let turns = if slides { Vec3::zeros() } else { axis };
             let (moves, turns) = (to_view * moves, to_view * turns);
-            columns[joint] +=
-                Twist::new(moves.x, moves.y, moves.z, turns.x, turns.y, turns.z);
+            columns[joint] += Twist::new(moves.x, moves.y, moves.z, turns.x, turns.y, turns.z);
         }
         columns[count] = Twist::new(0.0, 0.0, -1.0, 0.0, 0.0, 0.0);
         columns[count + 1] = Twist::new(0.0, 0.0, 0.0, 0.0, 0.0, -1.0);

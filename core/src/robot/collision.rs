@@ -119,7 +119,12 @@ impl Collisions {
     }
 
     /// With the object's bodies, which must stay clear of all that moves relative to the object.
-    pub(crate) fn with(&self, robot: &RobotModel, chain: &Chain, obstacle: &Obstacle) -> Collisions {
+    pub(crate) fn with(
+        &self,
+        robot: &RobotModel,
+        chain: &Chain,
+        obstacle: &Obstacle,
+    ) -> Collisions {
         let mut all = self.clone();
         for (shape, pose) in &obstacle.shapes {
             let solid = Solid::new(shape, pose);

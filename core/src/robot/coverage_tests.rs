@@ -16,10 +16,7 @@ fn view(direction: &Vec3, distance: f64) -> Pose {
     let x = if z.z.abs() > 0.99 { Vec3::x() } else { z.cross(&Vec3::z()).normalize() };
     let rotation = Rotation3::from_basis_unchecked(&[x, z.cross(&x), z]);
     let position = middle - z * distance;
-    Pose::from_parts(
-        Translation3::from(position),
-        UnitQuaternion::from_rotation_matrix(&rotation),
-    )
+    Pose::from_parts(Translation3::from(position), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
 fn workcell(setup: &str) -> Workcell {
@@ -39,8 +36,16 @@ fn report() {
         let home = home(setup).unwrap();
         println!("home {:?}", cell.obstructed(&home, &object(), 0.01).unwrap());
         let laser = setup.contains("laser");
-        let sensor = if laser { SensorModel::Striper(StriperModel::SCANCONTROL) } else { SensorModel::Stereo(StereoModel::GUPPY) };
-        let elevations: Vec<f64> = if laser { (0..10).map(|i| -10.0 + 10.0 * f64::from(i)).collect() } else { (-8..=8).map(|i| 10.0 * f64::from(i)).collect() };
+        let sensor = if laser {
+            SensorModel::Striper(StriperModel::SCANCONTROL)
+        } else {
+            SensorModel::Stereo(StereoModel::GUPPY)
+        };
+        let elevations: Vec<f64> = if laser {
+            (0..10).map(|i| -10.0 + 10.0 * f64::from(i)).collect()
+        } else {
+            (-8..=8).map(|i| 10.0 * f64::from(i)).collect()
+        };
         let quiet = std::env::var("QUIET").is_ok();
         let mut total = [0, 0];
         let mut worst = (0.0, String::new());
@@ -52,21 +57,60 @@ fn report() {
                 let (e, a) = (e.to_radians(), f64::from(a).to_radians());
                 let direction = Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
                 let obstacle = object();
-                let request = ReachRequest { view: view(&direction, sensor.working_distance()), start: &home, sweep: sensor.sweep(), slide: slide_range(&sensor, 0.15), obstacle: &obstacle, margin: 0.01 };
+                let request = ReachRequest {
+                    view: view(&direction, sensor.working_distance()),
+                    start: &home,
+                    sweep: sensor.sweep(),
+                    slide: slide_range(&sensor, 0.15),
+                    obstacle: &obstacle,
+                    margin: 0.01,
+                };
                 let begin = std::time::Instant::now();
                 let reach = cell.reach(&request).unwrap();
                 let took = begin.elapsed().as_secs_f64();
-                if took > worst.0 { worst = (took, format!("{e} {a} {reach:.0?}").chars().take(90).collect()); }
+                if took > worst.0 {
+                    worst = (took, format!("{e} {a} {reach:.0?}").chars().take(90).collect());
+                }
                 total[1] += 1;
                 match &reach {
-                    Reach::Reached(r) => { total[0] += 1; sum_ok += took; n_ok += 1; motion += r.duration; line.push(if r.path.positions.len() > 0 { '#' } else { '+' }); }
-                    Reach::Refused { reason } => { sum_bad += took; n_bad += 1;
-                        line.push(if reason.starts_with("out") { 'o' } else if reason.contains("no free way") { 'p' } else if reason.contains("sweep") { 's' } else { 'c' });
-                        if !quiet && std::env::var("WHY").is_ok() { println!("{reason}"); } }
+                    Reach::Reached(r) => {
+                        total[0] += 1;
+                        sum_ok += took;
+                        n_ok += 1;
+                        motion += r.duration;
+                        line.push(if r.path.positions.len() > 0 { '#' } else { '+' });
+                    }
+                    Reach::Refused { reason } => {
+                        sum_bad += took;
+                        n_bad += 1;
+                        line.push(if reason.starts_with("out") {
+                            'o'
+                        } else if reason.contains("no free way") {
+                            'p'
+                        } else if reason.contains("sweep") {
+                            's'
+                        } else {
+                            'c'
+                        });
+                        if !quiet && std::env::var("WHY").is_ok() {
+                            println!("{reason}");
+                        }
+                    }
                 }
             }
-            if !quiet { println!("{line}"); }
+            if !quiet {
+                println!("{line}");
+            }
         }
-        println!("reached {} of {}; reached {:.1} ms, refused {:.1} ms, worst {:.1} ms {}; motion {:.2} s", total[0], total[1], 1e3 * sum_ok / f64::from(n_ok.max(1)), 1e3 * sum_bad / f64::from(n_bad.max(1)), 1e3 * worst.0, worst.1, motion / f64::from(n_ok.max(1)));
+        println!(
+            "reached {} of {}; reached {:.1} ms, refused {:.1} ms, worst {:.1} ms {}; motion {:.2} s",
+            total[0],
+            total[1],
+            1e3 * sum_ok / f64::from(n_ok.max(1)),
+            1e3 * sum_bad / f64::from(n_bad.max(1)),
+            1e3 * worst.0,
+            worst.1,
+            motion / f64::from(n_ok.max(1))
+        );
     }
 }

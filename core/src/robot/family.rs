@@ -162,7 +162,8 @@ fn turned(
     let mut others = Vec::new();
     for (&joint, &value) in chain.joints.iter().zip(x) {
         let turns = robot.joints[joint].kind != super::JointKind::Prismatic;
-        let mut rounds = if turns { rounds(value, robot.joints[joint].limits) } else { vec![value] };
+        let mut rounds =
+            if turns { rounds(value, robot.joints[joint].limits) } else { vec![value] };
         rounds.sort_by(|a, b| (a - start[joint]).abs().total_cmp(&(b - start[joint]).abs()));
         nearest[joint] = rounds.first().copied().unwrap_or(value);
         others.extend(rounds.iter().skip(1).take(1).map(|&other| (joint, other)));

@@ -69,8 +69,7 @@ fn step(columns: &[Twist], error: &Twist, x: &[f64], bounds: &Bounds) -> Option<
             }
         }
         let push = normal.cholesky()?.solve(error);
-        let step: Vec<f64> =
-            columns.iter().zip(&weights).map(|(c, w)| w * c.dot(&push)).collect();
+        let step: Vec<f64> = columns.iter().zip(&weights).map(|(c, w)| w * c.dot(&push)).collect();
         let mut kept = false;
         for (i, s) in step.iter().enumerate() {
             let [low, high] = bounds.limits[i];

@@ -21,6 +21,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod tree;
 mod urdf;
 mod workcell;
 

@@ -63,16 +63,10 @@ pub(crate) fn search(
 
 /// Grows the tree from its nearest node towards `target`, at most `steps` steps: the last node added, and whether
 /// that is the target.
-fn grow(
-    space: &Space,
-    tree: &mut Tree,
-    target: &[f64],
-    steps: usize,
-) -> (Option<usize>, bool) {
+fn grow(space: &Space, tree: &mut Tree, target: &[f64], steps: usize) -> (Option<usize>, bool) {
     let time = |q: &Vec<f64>| space.robot.joint_time(q, target);
-    let nearest = (0..tree.nodes.len()).min_by(|&a, &b| {
-        time(&tree.nodes[a]).total_cmp(&time(&tree.nodes[b])).then(a.cmp(&b))
-    });
+    let nearest = (0..tree.nodes.len())
+        .min_by(|&a, &b| time(&tree.nodes[a]).total_cmp(&time(&tree.nodes[b])).then(a.cmp(&b)));
     let Some(mut at) = nearest else { return (None, false) };
     let mut added = None;
     for _ in 0..steps {
@@ -114,16 +108,14 @@ fn shortened(space: &Space, mut way: Vec<Vec<f64>>, rng: &mut ChaCha8Rng) -> Vec
         if way.len() < 3 {
             break;
         }
-        let mut ends =
-            [0; 2].map(|_| rng.random_range(0.0..(way.len() - 1) as f64));
+        let mut ends = [0; 2].map(|_| rng.random_range(0.0..(way.len() - 1) as f64));
         ends.sort_by(f64::total_cmp);
         let legs = ends.map(|e| e as usize);
         if legs[0] == legs[1] {
             continue;
         }
-        let points = [0, 1].map(|i| {
-            between(&way[legs[i]], &way[legs[i] + 1], ends[i] - legs[i] as f64)
-        });
+        let points =
+            [0, 1].map(|i| between(&way[legs[i]], &way[legs[i] + 1], ends[i] - legs[i] as f64));
         if space.blocked(&points[0], &points[1]).is_none() {
             way.splice(legs[0] + 1..=legs[1], points);
         }

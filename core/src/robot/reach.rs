@@ -6,8 +6,8 @@ use super::motion::Space;
 use super::timing::{Trajectory, parametrised};
 use super::workcell::Workcell;
 use super::{path, sweep};
-use crate::geometry::{Pose, SensorModel};
 use crate::Result;
+use crate::geometry::{Pose, SensorModel};
 
 /// A view to be taken.
 #[derive(Clone, Copy, Debug)]
@@ -111,14 +111,8 @@ impl Workcell {
         let [low, high] = request.slide;
         for (seeds, slide) in SEEDS.into_iter().zip([[0f64.clamp(low, high); 2], [low, high]]) {
             let extent = Extent { seeds, slide };
-            let members = family(
-                &self.robot,
-                &self.chain,
-                &self.seeds,
-                &request.view,
-                request.start,
-                extent,
-            );
+            let members =
+                family(&self.robot, &self.chain, &self.seeds, &request.view, request.start, extent);
             if let Some(reached) = self.choose(&space, request, members, &mut failures) {
                 return Ok(Reach::Reached(Box::new(reached)));
             }

@@ -39,7 +39,9 @@ impl BodyFilter {
     fn holds(&self, point: &Vec3) -> bool {
         self.bodies.iter().any(|body| {
             (point - body.middle).norm_squared() <= body.far
-                && body.shape.distance(&(body.shape_from_frame * nalgebra::Point3::from(*point)).coords)
+                && body
+                    .shape
+                    .distance(&(body.shape_from_frame * nalgebra::Point3::from(*point)).coords)
                     <= self.margin
         })
     }

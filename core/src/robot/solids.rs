@@ -1,7 +1,7 @@
 //! The robot's bodies as triangles.
 
-use super::model::RobotModel;
 use super::OBJECT_FRAME;
+use super::model::RobotModel;
 use crate::Result;
 use crate::geometry::{Pose, Shape, Vec3};
 use crate::mesh::Mesh;
@@ -42,9 +42,12 @@ fn add(mesh: &mut Mesh, part: &Mesh, pose: &Pose) {
 fn triangulated(shape: &Shape) -> Mesh {
     match *shape {
         Shape::Box { half } => cuboid(&half),
-        Shape::Cylinder { radius, half_length } => {
-            turned(&[(0.0, -half_length), (radius, -half_length), (radius, half_length), (0.0, half_length)])
-        }
+        Shape::Cylinder { radius, half_length } => turned(&[
+            (0.0, -half_length),
+            (radius, -half_length),
+            (radius, half_length),
+            (0.0, half_length),
+        ]),
         Shape::Sphere { radius } => {
             let rings = CORNERS / 2;
             let profile: Vec<(f64, f64)> = (0..=rings)

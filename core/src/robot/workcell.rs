@@ -68,7 +68,12 @@ impl Workcell {
     ///
     /// # Errors
     /// As [`RobotModel::check`].
-    pub fn obstructed(&self, q: &[f64], obstacle: &Obstacle, margin: f64) -> Result<Option<String>> {
+    pub fn obstructed(
+        &self,
+        q: &[f64],
+        obstacle: &Obstacle,
+        margin: f64,
+    ) -> Result<Option<String>> {
         self.robot.check(q)?;
         if let Some(joint) = self.robot.beyond_limits(q) {
             return Ok(Some(format!("the joint `{}` is beyond its limits", joint.name)));
