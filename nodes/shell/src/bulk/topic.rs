@@ -2,6 +2,7 @@
 
 use super::error::BulkError;
 use super::wire::{Id, Tile, TileAck};
+use puffer_msgs::Interface;
 use ros2_client::qos::{History, QosProfile};
 use ros2_client::{MessageTypeName, Name, Node, Publisher, Subscription};
 use rustdds::Topic;
@@ -23,13 +24,13 @@ impl Endpoints {
     pub(crate) fn new(node: &Node, topic: &str) -> Result<Endpoints, BulkError> {
         let make = |suffix: &str, kind: &str, kept: usize| {
             let name = Name::parse(&format!("{topic}/{suffix}")).map_err(|e| refused(topic, e))?;
-            let kind = MessageTypeName::new("puffer_msgs", kind);
+            let kind = MessageTypeName::new(Tile::PACKAGE, kind);
             node.create_topic(&name, kind, &quality(kept)).map_err(|e| refused(topic, e))
         };
         Ok(Endpoints {
             topic: topic.to_owned(),
-            tiles: make("tiles", "Tile", TILES_KEPT)?,
-            acks: make("tiles_ack", "TileAck", ACKS_KEPT)?,
+            tiles: make("tiles", Tile::NAME, TILES_KEPT)?,
+            acks: make("tiles_ack", TileAck::NAME, ACKS_KEPT)?,
         })
     }
 
