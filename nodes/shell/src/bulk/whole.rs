@@ -3,6 +3,7 @@
 use super::error::BulkError;
 use super::graph::{dds_name, outside_readers};
 use super::host::receive_buffer_limit;
+use super::inbox::{Closed, Delivery, Inbox};
 use super::raw::{Raw, RawAdapter};
 use super::topic::{refused, start};
 use bytes::Bytes;
@@ -11,8 +12,8 @@ use rustdds::dds::CreateResult;
 use rustdds::no_key::DataWriter;
 use rustdds::policy::{Durability, History, Reliability, ResourceLimits};
 use rustdds::{DomainParticipant, Duration as DdsDuration, QosPolicyBuilder, TopicKind};
+use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::watch;
 
 /// How often to look for readers of a latched message.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
@@ -24,7 +25,7 @@ const STOCK_LIMIT: usize = 212_992;
 /// Passes on whole messages while outsiders read them. Of messages that come faster than they can be passed on, the
 /// newest counts: outsiders watch, they do not measure.
 pub(crate) struct Whole {
-    newest: watch::Sender<Option<Bytes>>,
+    newest: Arc<Inbox>,
 }
 
 impl Whole {
@@ -36,7 +37,8 @@ impl Whole {
     ) -> Result<Whole, BulkError> {
         let writer =
             make(participant, topic, kind, latched).map_err(|error| refused(topic, error))?;
-        let (newest, messages) = watch::channel(None);
+        let newest = Arc::new(Inbox::new(Delivery::Newest));
+        let messages = Arc::clone(&newest);
         let run = Run {
             topic: topic.to_owned(),
             participant: participant.clone(),
@@ -53,7 +55,13 @@ impl Whole {
     }
 
     pub(crate) fn publish(&self, message: Bytes) {
-        self.newest.send_replace(Some(message));
+        self.newest.put(message);
+    }
+}
+
+impl Drop for Whole {
+    fn drop(&mut self) {
+        self.newest.close();
     }
 }
 
@@ -70,17 +78,17 @@ struct Run {
 }
 
 impl Run {
-    async fn run(mut self, mut messages: watch::Receiver<Option<Bytes>>) {
+    async fn run(mut self, messages: Arc<Inbox>) {
         loop {
+            match messages.take() {
+                Ok(Some(message)) => self.unsent = Some(message),
+                Ok(None) => {}
+                Err(Closed) => return,
+            }
+            self.send();
             tokio::select! {
-                changed = messages.changed() => {
-                    if changed.is_err() {
-                        return;
-                    }
-                    self.unsent = messages.borrow_and_update().clone();
-                    self.send();
-                }
-                () = tokio::time::sleep(LOOK_EVERY), if self.unsent.is_some() => self.send(),
+                () = messages.filled.notified() => {}
+                () = tokio::time::sleep(LOOK_EVERY), if self.unsent.is_some() => {}
             }
         }
     }
