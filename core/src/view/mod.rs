@@ -33,3 +33,6 @@ pub(crate) fn looking_along(position: &Vec3, direction: &Vec3) -> Pose {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod loop_tests;

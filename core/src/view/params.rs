@@ -67,7 +67,7 @@ crate::params! {
         /// Planning ends when no view gains more than this share of the known surface voxels; 0 goes on to the last voxel.
         min_gain: f64 = 0.005, in [0.0, 1.0];
         /// Scans that look at a voxel in vain before it counts as not measurable.
-        max_tries: usize = 2, in [1, 100];
+        max_tries: usize = 3, in [1, 100];
         /// Scans that must see through a voxel for each that hit it, before it is no surface.
         hit_weight: f64 = 2.0, in [0.1, 100.0];
         /// Points with fewer of the same scan in their voxel and those around it are outliers and left out.
