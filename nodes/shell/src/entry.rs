@@ -10,13 +10,24 @@ const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 const INTERRUPTED: u8 = 130;
 
-/// Reads the program's arguments, runs `run` and gives the exit status: 0 done, 1 failed (one message on
-/// standard error), 2 wrong usage, 130 interrupted by SIGINT or SIGTERM.
+/// As [`main_with`], with the arguments of the program.
 pub fn main<F>(run: impl FnOnce(RosArgs, Stop) -> F) -> ExitCode
 where
     F: Future<Output = anyhow::Result<()>>,
 {
-    let args = match RosArgs::parse(std::env::args().skip(1)) {
+    main_with(std::env::args().skip(1), run)
+}
+
+/// Reads the arguments `args`, runs `run` and gives the exit status: 0 done, 1 failed (one message on
+/// standard error), 2 wrong usage, 130 interrupted by SIGINT or SIGTERM.
+pub fn main_with<F>(
+    args: impl IntoIterator<Item = String>,
+    run: impl FnOnce(RosArgs, Stop) -> F,
+) -> ExitCode
+where
+    F: Future<Output = anyhow::Result<()>>,
+{
+    let args = match RosArgs::parse(args) {
         Ok(args) => args,
         Err(error) => return fail(WRONG_USAGE, &error),
     };

@@ -38,7 +38,7 @@ mod topic;
 pub use action::{ActionClient, Goal, GoalHandle, Outcome};
 pub use args::{RosArgs, ServiceMapping};
 pub use diagnostics::{Diagnostics, Health};
-pub use entry::main;
+pub use entry::{main, main_with};
 pub use node::Node;
 pub use params::NoParams;
 pub use puffer_msgs::{Action, Interface, Service};
