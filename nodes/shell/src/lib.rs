@@ -17,6 +17,7 @@
 
 mod action;
 mod args;
+pub mod bag;
 pub mod bulk;
 mod clock;
 pub mod convert;

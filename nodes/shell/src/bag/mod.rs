@@ -1,0 +1,25 @@
+//! Bags: ROS 2 messages in MCAP files (<https://mcap.dev>), as `rosbag2_storage_mcap` writes and reads them.
+//!
+//! Messages stay bytes (CDR with its encapsulation header), so that any type can be recorded and played. A recording that
+//! was cut off can be read up to the last whole chunk.
+
+mod block;
+mod error;
+mod folder;
+mod index;
+mod info;
+mod messages;
+mod qos;
+mod reader;
+mod rosbag2;
+mod scan;
+mod summary;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use error::BagError;
+pub use info::{BagInfo, BagMessage, BagTopic};
+pub use messages::Messages;
+pub use reader::BagReader;
+pub use writer::BagWriter;
