@@ -88,8 +88,7 @@ fn solid_space_neither_asks_nor_is_asked_for() {
         judge.gain(&pose, &mut judge.set())
     };
     let (through, open) = (gain(-0.6), gain(0.6));
-    assert_eq!((through.lacking, through.hidden, through.unknown), (0, 0, 0));
-    assert!(open.hidden > 10);
+    assert!(through.hidden == 0 && open.hidden > 10, "{through:?} {open:?}");
 }
 
 #[test]
