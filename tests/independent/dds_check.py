@@ -17,10 +17,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from cyclonedds.builtin import (
+    BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import array, int32, int64, sequence, uint8, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -70,6 +72,25 @@ class GetTypesResponse(IdlStruct, typename="rcl_interfaces::srv::dds_::GetParame
     client: uint64
     number: int64
     types: sequence[uint8]
+
+
+@dataclass
+class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    data: array[uint8, 16]
+
+
+@dataclass
+class NodeEntities(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    node_namespace: str
+    node_name: str
+    reader_gids: sequence[Gid]
+    writer_gids: sequence[Gid]
+
+
+@dataclass
+class ParticipantEntities(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    gid: Gid
+    nodes: sequence[NodeEntities]
 
 
 def quality(durability=Policy.Durability.Volatile, depth=10):
@@ -155,6 +176,34 @@ def check_parameters(wire):
     assert list(take(answers, 1, "types")[0].types) == [1, 3, 0]
 
 
+def check_graph(wire):
+    """What the node announces is what Cyclone DDS discovers: `ros2 node info` puts the two together."""
+    told = wire.reader("ros_discovery_info", ParticipantEntities, quality(Policy.Durability.TransientLocal, 100))
+    found = {kind: BuiltinDataReader(wire.participant, topic) for kind, topic in
+             [("reader", BuiltinTopicDcpsSubscription), ("writer", BuiltinTopicDcpsPublication)]}
+    names = {kind: {} for kind in found}
+    announced = []
+
+    def agree():
+        announced.extend(sample for sample in told.take(N=100) if sample.sample_info.valid_data)
+        for kind, reader in found.items():
+            for sample in reader.take(N=1000):
+                names[kind][sample.key.bytes] = (sample.participant_key.bytes, sample.topic_name)
+        nodes = [(bytes(a.gid.data), a.nodes[0]) for a in announced if a.nodes and a.nodes[0].node_name == "peer"]
+        if not nodes:
+            return False
+        participant, node = nodes[-1]
+        assert node.node_namespace == "/", node
+        for kind, gids in [("reader", node.reader_gids), ("writer", node.writer_gids)]:
+            ros = {key for key, (owner, topic) in names[kind].items()
+                   if owner == participant and topic != "ros_discovery_info"}
+            if not ros or ros != {bytes(gid.data) for gid in gids}:
+                return False
+        return True
+
+    wait("the node announces the endpoints that it has", agree)
+
+
 def check_client(wire, start):
     asked = wire.reader("rq/switchRequest", SwitchRequest)
     answers = wire.writer("rr/switchReply", SwitchResponse)
@@ -189,6 +238,7 @@ def main():
             ("a latched message for a late joiner", lambda: check_latched(wire)),
             ("a call of the node's service", lambda: check_server(wire)),
             ("the node's parameter services", lambda: check_parameters(wire)),
+            ("the node's endpoints in the graph", lambda: check_graph(wire)),
             ("a call that the node makes", lambda: check_client(wire, start)),
         ]:
             since = time.monotonic()

@@ -1,5 +1,8 @@
 //! Bulk transport through nodes.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, free_domain, node_with};

@@ -1,5 +1,8 @@
 //! Services and topics with endpoints made through ros2-client, whose conventions are another implementation's.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, free_domain, node_with};

@@ -2,7 +2,7 @@
 
 use super::wire;
 use super::{CallError, SERVICE_QOS_DEPTH, endpoint_types};
-use crate::dds::{Dds, Raw, Reader, Writer, encode};
+use crate::dds::{Dds, Matches, Raw, Reader, Writer, encode};
 use crate::{ServiceMapping, Stop};
 use anyhow::Result;
 use puffer_msgs::Service;
@@ -107,6 +107,11 @@ impl<S: Service> Client<S> {
     /// Whether a server is matched now.
     pub fn is_ready(&self) -> bool {
         !self.inner.servers().is_empty()
+    }
+
+    /// Who is matched with this and all other endpoints of the node.
+    pub(crate) fn matches(&self) -> &Matches {
+        self.inner.writer.matches()
     }
 
     /// Absolute name of the service.
