@@ -18,6 +18,8 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 /// client and server has not worked before; doubled each time. The first call after matching can get lost,
 /// because discovery tells one side before the other.
 const FIRST_PATIENCE: Duration = Duration::from_secs(1);
+/// How long a server that has just been found is given to find this client.
+const SETTLING: Duration = Duration::from_millis(100);
 /// How long a server that was there may be away during a call (it restarts) before the call is given up.
 const ABSENCE: Duration = Duration::from_secs(3);
 
@@ -135,14 +137,14 @@ impl Inner {
         let mut call = PendingCall { inner: self, sequences: Vec::new() };
         let mut patience = FIRST_PATIENCE;
         self.writer.matches().wait(|_| !self.servers().is_empty()).await;
+        if !self.are_proven(&self.servers()) {
+            tokio::time::sleep(SETTLING).await;
+        }
         loop {
             let servers = self.servers();
             call.send(payload, &sender)?;
             attempts.fetch_add(1, Ordering::Relaxed);
-            let proven = {
-                let proven = self.proven.lock().unwrap_or_else(PoisonError::into_inner);
-                servers.iter().all(|server| proven.contains(server))
-            };
+            let proven = self.are_proven(&servers);
             tokio::select! {
                 answer = next(&mut answers) => {
                     let mut proven = self.proven.lock().unwrap_or_else(PoisonError::into_inner);
@@ -155,6 +157,11 @@ impl Inner {
                 }
             }
         }
+    }
+
+    /// Whether all of them have answered.
+    fn are_proven(&self, servers: &BTreeSet<GUID>) -> bool {
+        self.proven.lock().unwrap_or_else(PoisonError::into_inner).is_superset(servers)
     }
 
     /// Waits for a server that has gone.
