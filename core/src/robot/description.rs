@@ -23,7 +23,7 @@ pub fn description(setup: &str) -> Result<&'static str> {
 /// As [`description`].
 pub fn home(setup: &str) -> Result<Vec<f64>> {
     let degrees: &[f64] = match setup {
-        "kr16_laser" => &[0.0, -110.0, 110.0, 0.0, 60.0, 0.0],
+        "kr16_laser" => &[0.0, -130.0, 120.0, 0.0, 60.0, 0.0],
         "omnirob_stereo" => {
             let arm = [0.0, -30.0, 0.0, 90.0, 0.0, 60.0, 0.0];
             // Jaws half open; the head looks ahead.

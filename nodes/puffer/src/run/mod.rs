@@ -125,7 +125,7 @@ impl Run {
             fleet.roll().iter().map(|(name, process)| format!("{name} {process}")).collect();
         eprintln!("nodes on DDS domain {}: {}", self.domain, roll.join(", "));
         // Its own stop: Ctrl-C cancels the goal first, and the goal needs the node.
-        let args = RosArgs::default().with_domain(self.domain);
+        let args = RosArgs::parse(std::iter::empty())?.with_domain(self.domain);
         let node: Node<NoParams> = Node::start("puffer_model", args, Stop::new()).await?;
         let ending = tokio::select! {
             ending = pursue(&node, &self.plan.object, &stop) => ending?,

@@ -18,6 +18,14 @@ pub(crate) struct CallId {
 /// sequence number.
 const CYCLONE_HEADER: usize = 16;
 
+/// Enhanced: payloads beyond this many bytes leave in fragments, and rustdds 0.15.1 writes a fragment's inline QoS so that
+/// nobody can read it. Their identity stands behind the payload, where a reader of CDR does not look.
+const LARGEST_WHOLE: usize = 1024;
+/// In front of an identity that stands behind the payload.
+const TRAILER_MARK: [u8; 8] = *b"\0related";
+/// Mark, GUID, sequence number.
+const TRAILER: usize = 8 + 16 + 8;
+
 /// What goes out: bytes and the related sample identity of the inline QoS.
 pub(crate) type Outgoing = (Vec<u8>, Option<SampleIdentity>);
 
@@ -35,7 +43,7 @@ pub(crate) fn request(
         ServiceMapping::Enhanced => {
             let sequence_number = first.map_or(SequenceNumber::UNKNOWN, SequenceNumber::from);
             let related = SampleIdentity { writer_guid: reply_reader, sequence_number };
-            (payload.to_vec(), Some(related))
+            with_identity(payload, related)
         }
         ServiceMapping::Cyclone => {
             (with_header(cyclone_tag(writer), first.unwrap_or_default(), payload), None)
@@ -51,14 +59,15 @@ pub(crate) fn read_request(
     match mapping {
         ServiceMapping::Enhanced => {
             let own = sample.identity;
-            let known = sample.related.filter(|related| related.writer_guid != GUID::GUID_UNKNOWN);
+            let (related, raw) = split_identity(sample);
+            let known = related.filter(|related| related.writer_guid != GUID::GUID_UNKNOWN);
             let client = known.map_or(own.writer_guid, |related| related.writer_guid);
             let sequence = known
                 .map(|related| related.sequence_number)
                 .filter(|number| *number != SequenceNumber::UNKNOWN && i64::from(*number) > 0)
                 .unwrap_or(own.sequence_number);
             let id = CallId { client: client.to_bytes(), sequence: i64::from(sequence) };
-            Ok((id, sample.raw.clone()))
+            Ok((id, raw))
         }
         ServiceMapping::Cyclone => {
             let (tag, sequence, payload) = split_header(&sample.raw)?;
@@ -78,7 +87,7 @@ pub(crate) fn reply(mapping: ServiceMapping, payload: &[u8], id: CallId) -> Outg
                 writer_guid: GUID::from_bytes(id.client),
                 sequence_number: SequenceNumber::from(id.sequence),
             };
-            (payload.to_vec(), Some(related))
+            with_identity(payload, related)
         }
         ServiceMapping::Cyclone => {
             let mut tag = [0; 8];
@@ -97,12 +106,13 @@ pub(crate) fn read_reply(
 ) -> Result<Option<(i64, Raw)>, String> {
     match mapping {
         ServiceMapping::Enhanced => {
-            let related = sample.related.ok_or(
+            let (related, raw) = split_identity(sample);
+            let related = related.ok_or(
                 "a reply without related sample identity: does its server speak rmw_cyclonedds's \
                  convention? Set RMW_IMPLEMENTATION alike on both sides",
             )?;
             let mine = related.writer_guid == writer || related.writer_guid == reply_reader;
-            Ok(mine.then(|| (i64::from(related.sequence_number), sample.raw.clone())))
+            Ok(mine.then(|| (i64::from(related.sequence_number), raw)))
         }
         ServiceMapping::Cyclone => {
             let (tag, sequence, payload) = split_header(&sample.raw)?;
@@ -116,6 +126,36 @@ pub(crate) fn read_reply(
 fn cyclone_tag(writer: GUID) -> [u8; 8] {
     let guid = writer.to_bytes();
     std::array::from_fn(|i| guid[i] ^ guid[i + 8])
+}
+
+/// A payload with its identity, in the inline QoS or behind it.
+fn with_identity(payload: &[u8], related: SampleIdentity) -> Outgoing {
+    if payload.len() <= LARGEST_WHOLE {
+        return (payload.to_vec(), Some(related));
+    }
+    let mut bytes = payload.to_vec();
+    bytes.extend(TRAILER_MARK);
+    bytes.extend(related.writer_guid.to_bytes());
+    bytes.extend(i64::from(related.sequence_number).to_le_bytes());
+    (bytes, None)
+}
+
+/// The identity of a sample, wherever it stands, and its payload alone.
+fn split_identity(sample: &Sample) -> (Option<SampleIdentity>, Raw) {
+    let body = &sample.raw.body;
+    let found = body
+        .len()
+        .checked_sub(TRAILER)
+        .filter(|start| sample.related.is_none() && body[*start..].starts_with(&TRAILER_MARK));
+    let Some(start) = found else { return (sample.related, sample.raw.clone()) };
+    let (mut guid, mut number) = ([0; 16], [0; 8]);
+    guid.copy_from_slice(&body[start + 8..start + 24]);
+    number.copy_from_slice(&body[start + 24..]);
+    let related = SampleIdentity {
+        writer_guid: GUID::from_bytes(guid),
+        sequence_number: SequenceNumber::from(i64::from_le_bytes(number)),
+    };
+    (Some(related), Raw { body: body.slice(..start), encoding: sample.raw.encoding })
 }
 
 fn with_header(tag: [u8; 8], sequence: i64, payload: &[u8]) -> Vec<u8> {
@@ -174,6 +214,26 @@ mod tests {
             read_request(ServiceMapping::Enhanced, &sample(sent, WRITER, 7)).unwrap();
         assert_eq!(id, CallId { client: READER, sequence: 7 });
         assert_eq!(&payload.body[..], b"abcd");
+    }
+
+    #[test]
+    fn what_leaves_in_fragments_has_its_identity_behind_it() {
+        let long = vec![7; LARGEST_WHOLE + 1];
+        for first in [None, Some(7)] {
+            let sent = request(ServiceMapping::Enhanced, &long, guid(WRITER), guid(READER), first);
+            assert!(sent.1.is_none());
+            assert_eq!(sent.0[..long.len()], long);
+            let sample = sample(sent, WRITER, 7);
+            let (id, payload) = read_request(ServiceMapping::Enhanced, &sample).unwrap();
+            assert_eq!(id, CallId { client: READER, sequence: 7 });
+            assert_eq!(payload.body, long);
+            let sent = reply(ServiceMapping::Enhanced, &long, id);
+            let (mapping, writer) = (ServiceMapping::Enhanced, guid(WRITER));
+            let sample = self::sample(sent, OTHER, 1);
+            let got = read_reply(mapping, &sample, writer, guid(READER)).unwrap();
+            let (sequence, payload) = got.unwrap();
+            assert_eq!((sequence, payload.body), (7, Bytes::from(long.clone())));
+        }
     }
 
     #[test]
