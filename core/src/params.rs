@@ -2,7 +2,7 @@
 //! YAML, the `--help` texts and the reference table are made from them.
 
 use crate::{Error, Result};
-use serde_json::Value;
+pub use serde_json::Value;
 
 /// What is known of one parameter.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,10 +149,10 @@ macro_rules! choice {
         impl $crate::params::ParamValue for $name {
             const KIND: &'static str = "choice";
             const CHOICES: &'static [&'static str] = &[$($word),*];
-            fn to_value(&self) -> serde_json::Value {
-                serde_json::Value::from(match self { $($name::$variant => $word,)* })
+            fn to_value(&self) -> $crate::params::Value {
+                $crate::params::Value::from(match self { $($name::$variant => $word,)* })
             }
-            fn from_value(value: &serde_json::Value) -> Option<Self> {
+            fn from_value(value: &$crate::params::Value) -> Option<Self> {
                 match value.as_str()? { $($word => Some($name::$variant),)* _ => None }
             }
         }
@@ -173,7 +173,7 @@ macro_rules! param_groups {
                 [$(<$type>::specs()),*].concat()
             }
             fn set_named(
-                &mut self, group: &str, field: &str, value: &serde_json::Value,
+                &mut self, group: &str, field: &str, value: &$crate::params::Value,
             ) -> $crate::Result<()> {
                 match group {
                     $(<$type>::GROUP => self.$field.set(field, value),)*
@@ -186,7 +186,7 @@ macro_rules! param_groups {
                     }),
                 }
             }
-            fn all_values(&self) -> Vec<(String, serde_json::Value)> {
+            fn all_values(&self) -> Vec<(String, $crate::params::Value)> {
                 let mut all = Vec::new();
                 $(all.extend(self.$field.values().into_iter().map(|(field, value)| {
                     (format!("{}.{field}", <$type>::GROUP), value)
@@ -235,7 +235,7 @@ macro_rules! params {
             /// # Errors
             /// [`Error::Parameter`](crate::Error::Parameter) if there is no such field, or the value has
             /// the wrong type or is out of range.
-            pub fn set(&mut self, field: &str, value: &serde_json::Value) -> $crate::Result<()> {
+            pub fn set(&mut self, field: &str, value: &$crate::params::Value) -> $crate::Result<()> {
                 match field {
                     $(stringify!($field) => {
                         self.$field = $crate::params::read_field(
@@ -251,7 +251,7 @@ macro_rules! params {
             }
 
             /// The values as JSON, in the order of declaration.
-            pub fn values(&self) -> Vec<(&'static str, serde_json::Value)> {
+            pub fn values(&self) -> Vec<(&'static str, $crate::params::Value)> {
                 vec![$((stringify!($field), $crate::params::ParamValue::to_value(&self.$field))),*]
             }
         }

@@ -80,6 +80,12 @@ impl Registrar {
         changed
     }
 
+    /// Puts other points of the same scan in place of those of scan `index`, for when all scans are refined: once its
+    /// pose is known, more can be said about which points are the object's.
+    pub fn replace(&mut self, index: usize, scan: &PreparedScan) {
+        self.samples[index] = Sample::new(scan, self.params.samples);
+    }
+
     /// Tries all that were put aside until none can be placed.
     fn retry(&mut self) -> Vec<usize> {
         let mut placed = Vec::new();

@@ -1,116 +1,47 @@
-//! Which directions the set-ups can look from.
+//! Which directions the set-ups can look from. The bars lie a little below what was found.
 
+use super::tests::{cell, object, view};
 use super::*;
-use crate::geometry::{Aabb, Pose, SensorModel, StereoModel, StriperModel, Vec3};
-use nalgebra::{Rotation3, Translation3, UnitQuaternion};
-use rayon::prelude::*;
+use crate::geometry::{SensorModel, StereoModel, StriperModel, Vec3};
 
-/// Half the size of an object of 0.1 x 0.1 x 0.18 m; it stands on z = 0.
-fn object() -> Obstacle {
-    Obstacle::of_box(&Aabb { min: Vec3::new(-0.05, -0.05, 0.0), max: Vec3::new(0.05, 0.05, 0.18) })
-}
-
-fn view(direction: &Vec3, distance: f64) -> Pose {
-    let middle = Vec3::new(0.0, 0.0, 0.09);
-    let z = -direction.normalize();
-    let x = if z.z.abs() > 0.99 { Vec3::x() } else { z.cross(&Vec3::z()).normalize() };
-    let rotation = Rotation3::from_basis_unchecked(&[x, z.cross(&x), z]);
-    let position = middle - z * distance;
-    Pose::from_parts(Translation3::from(position), UnitQuaternion::from_rotation_matrix(&rotation))
-}
-
-fn workcell(setup: &str) -> Workcell {
-    Workcell::new(RobotModel::from_urdf(description(setup).unwrap()).unwrap()).unwrap()
+/// Share of the directions at these elevations (degrees, every 20 degrees of azimuth) that are reached from home.
+fn coverage(setup: &str, sensor: &SensorModel, elevations: &[f64]) -> f64 {
+    let (cell, home, obstacle) = (cell(setup), home(setup).unwrap(), object());
+    let (mut reached, mut asked) = (0, 0);
+    for elevation in elevations {
+        for azimuth in (0..360).step_by(20) {
+            let (e, a) = (elevation.to_radians(), f64::from(azimuth).to_radians());
+            let direction = Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
+            let request = ReachRequest {
+                view: view(&direction, sensor.working_distance()),
+                start: &home,
+                sweep: sensor.sweep(),
+                slide: slide_range(sensor, 0.15),
+                obstacle: &obstacle,
+                margin: 0.01,
+            };
+            asked += 1;
+            match cell.reach(&request).unwrap() {
+                Reach::Reached(_) => reached += 1,
+                Reach::Refused { reason } => println!("{elevation} {azimuth}: {reason}"),
+            }
+        }
+    }
+    f64::from(reached) / f64::from(asked)
 }
 
 #[test]
-#[ignore = "a search, not a test"]
-fn report() {
-    let which = std::env::var("CELL").unwrap_or_default();
-    for setup in SETUPS.iter().filter(|s| s.contains(&which)) {
-        let begin = std::time::Instant::now();
-        let text = std::env::var("URDF").ok().map(|p| std::fs::read_to_string(p).unwrap());
-        let text = text.unwrap_or_else(|| description(setup).unwrap().to_owned());
-        let cell = Workcell::new(RobotModel::from_urdf(&text).unwrap()).unwrap();
-        println!("{setup}: built in {:?}", begin.elapsed());
-        let home = home(setup).unwrap();
-        println!("home {:?}", cell.obstructed(&home, &object(), 0.01).unwrap());
-        let laser = setup.contains("laser");
-        let sensor = if laser {
-            SensorModel::Striper(StriperModel::SCANCONTROL)
-        } else {
-            SensorModel::Stereo(StereoModel::GUPPY)
-        };
-        let elevations: Vec<f64> = if laser {
-            (0..10).map(|i| -10.0 + 10.0 * f64::from(i)).collect()
-        } else {
-            (-8..=8).map(|i| 10.0 * f64::from(i)).collect()
-        };
-        let quiet = std::env::var("QUIET").is_ok();
-        let mut total = [0, 0];
-        let mut worst = (0.0, String::new());
-        let (mut sum_ok, mut n_ok, mut sum_bad, mut n_bad) = (0.0, 0, 0.0, 0);
-        let mut motion = 0.0;
-        for e in elevations.iter().rev() {
-            let mut line = format!("{e:5.0} ");
-            for a in (0..360).step_by(15) {
-                let (e, a) = (e.to_radians(), f64::from(a).to_radians());
-                let direction = Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
-                let obstacle = object();
-                let request = ReachRequest {
-                    view: view(&direction, sensor.working_distance()),
-                    start: &home,
-                    sweep: sensor.sweep(),
-                    slide: slide_range(&sensor, 0.15),
-                    obstacle: &obstacle,
-                    margin: 0.01,
-                };
-                let begin = std::time::Instant::now();
-                let reach = cell.reach(&request).unwrap();
-                let took = begin.elapsed().as_secs_f64();
-                if took > worst.0 {
-                    worst = (took, format!("{e} {a} {reach:.0?}").chars().take(90).collect());
-                }
-                total[1] += 1;
-                match &reach {
-                    Reach::Reached(r) => {
-                        total[0] += 1;
-                        sum_ok += took;
-                        n_ok += 1;
-                        motion += r.duration;
-                        line.push(if r.path.positions.len() > 0 { '#' } else { '+' });
-                    }
-                    Reach::Refused { reason } => {
-                        sum_bad += took;
-                        n_bad += 1;
-                        line.push(if reason.starts_with("out") {
-                            'o'
-                        } else if reason.contains("no free way") {
-                            'p'
-                        } else if reason.contains("sweep") {
-                            's'
-                        } else {
-                            'c'
-                        });
-                        if !quiet && std::env::var("WHY").is_ok() {
-                            println!("{reason}");
-                        }
-                    }
-                }
-            }
-            if !quiet {
-                println!("{line}");
-            }
-        }
-        println!(
-            "reached {} of {}; reached {:.1} ms, refused {:.1} ms, worst {:.1} ms {}; motion {:.2} s",
-            total[0],
-            total[1],
-            1e3 * sum_ok / f64::from(n_ok.max(1)),
-            1e3 * sum_bad / f64::from(n_bad.max(1)),
-            1e3 * worst.0,
-            worst.1,
-            motion / f64::from(n_ok.max(1))
-        );
-    }
+fn the_laser_sweeps_from_all_sides_of_the_table() {
+    let sensor = SensorModel::Striper(StriperModel::SCANCONTROL);
+    let share = coverage("kr16_laser", &sensor, &[10.0, 25.0, 40.0, 55.0, 75.0]);
+    assert!(share >= 0.98, "{share}");
+    let low = coverage("kr16_laser", &sensor, &[-10.0, 0.0]);
+    assert!(low >= 0.9, "{low}");
+}
+
+#[test]
+fn the_stereo_pair_sees_the_held_object_from_all_sides() {
+    let sensor = SensorModel::Stereo(StereoModel::GUPPY);
+    let share = coverage("omnirob_stereo", &sensor, &[-55.0, -30.0, 0.0, 30.0, 60.0, 85.0]);
+    assert!(share >= 0.98, "{share}");
 }

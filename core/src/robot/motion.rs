@@ -63,7 +63,10 @@ impl Space<'_> {
     }
 }
 
-/// The configuration at the share `t` of the straight way.
+/// The configuration at the share `t` of the straight way; the very end for `t >= 1`.
 pub(crate) fn between(a: &[f64], b: &[f64], t: f64) -> Vec<f64> {
+    if t >= 1.0 {
+        return b.to_vec();
+    }
     a.iter().zip(b).map(|(a, b)| a + (b - a) * t).collect()
 }

@@ -67,8 +67,9 @@ pub fn slide_range(sensor: &SensorModel, share: f64) -> [f64; 2] {
 const HALF_STEPS: usize = 6;
 /// Seeds of the first search, at the viewpoint itself, and of the second, with the slide free.
 const SEEDS: [usize; 2] = [24, 96];
-/// Configurations that the search for a way may end in.
+/// Configurations that one search for a way may end in, and how many searches are made.
 const GOALS: usize = 10;
+const BATCHES: usize = 4;
 /// Samples of the search for a way.
 const PATH_SAMPLES: usize = 1500;
 
@@ -120,7 +121,8 @@ impl Workcell {
         Ok(Reach::Refused { reason: failures.reason() })
     }
 
-    /// The first member that stands free, can sweep and has a way.
+    /// The first member that stands free, can sweep and has a straight way; else one of the first of them that a
+    /// way round the obstacles leads to.
     fn choose(
         &self,
         space: &Space,
@@ -128,30 +130,35 @@ impl Workcell {
         members: Vec<Member>,
         failures: &mut Failures,
     ) -> Option<Reached> {
-        let mut waiting: Vec<Candidate> = Vec::new();
-        for member in members {
-            failures.members += 1;
-            let Some(candidate) = self.candidate(space, request, member, failures) else {
-                continue;
-            };
-            if space.blocked(request.start, &candidate.member.q).is_none() {
-                let corners = [request.start.to_vec(), candidate.member.q.clone()];
+        let mut members = members.into_iter();
+        for _ in 0..BATCHES {
+            let mut waiting: Vec<Candidate> = Vec::new();
+            for member in members.by_ref() {
+                failures.members += 1;
+                let Some(candidate) = self.candidate(space, request, member, failures) else {
+                    continue;
+                };
+                if space.blocked(request.start, &candidate.member.q).is_none() {
+                    let corners = [request.start.to_vec(), candidate.member.q.clone()];
+                    return Some(self.reached(candidate, &corners));
+                }
+                waiting.push(candidate);
+                if waiting.len() >= GOALS {
+                    break;
+                }
+            }
+            if waiting.is_empty() {
+                return None;
+            }
+            failures.paths += waiting.len();
+            let goals: Vec<Vec<f64>> = waiting.iter().map(|c| c.member.q.clone()).collect();
+            if let Some(corners) = path::search(space, request.start, &goals, PATH_SAMPLES) {
+                let end = corners.last()?;
+                let candidate = waiting.into_iter().find(|c| c.member.q == *end)?;
                 return Some(self.reached(candidate, &corners));
             }
-            waiting.push(candidate);
-            if waiting.len() >= GOALS {
-                break;
-            }
         }
-        let goals: Vec<Vec<f64>> = waiting.iter().map(|c| c.member.q.clone()).collect();
-        if goals.is_empty() {
-            return None;
-        }
-        failures.paths += goals.len();
-        let corners = path::search(space, request.start, &goals, PATH_SAMPLES)?;
-        let end = corners.last()?;
-        let candidate = waiting.into_iter().find(|c| c.member.q == *end)?;
-        Some(self.reached(candidate, &corners))
+        None
     }
 
     fn candidate(

@@ -11,7 +11,7 @@ mod write;
 
 pub use crate::mesh::io::Unit;
 pub use source::{ScanSource, read_scans};
-pub use write::{write_poses, write_scans};
+pub use write::{ScanFolder, write_poses, write_scans};
 
 use crate::geometry::{Pose, Scan};
 

@@ -332,3 +332,25 @@ fn the_bunnys_scans_lie_on_the_mesh_that_was_made_of_them() {
         assert!(facing > returns.len() * 9 / 10, "{}: {facing} of {}", view.name, returns.len());
     }
 }
+
+#[test]
+fn a_folder_grows_view_by_view_and_a_view_may_come_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let ScanSet { mut views, .. } = set();
+    let head = ScanSet { views: Vec::new(), ..set() };
+    let mut growing = ScanFolder::create(&folder.path().join("scans"), head).unwrap();
+    for (count, view) in views.iter().enumerate() {
+        growing.put(view, json!({ "verdict": "first" })).unwrap();
+        growing.save().unwrap();
+        let read = read_scans(&folder.path().join("scans"), Unit::M).unwrap();
+        assert_eq!(read.views.len(), count + 1);
+    }
+    views[0].object_from_sensor = pose(0.9);
+    growing.put(&views[0], Value::Null).unwrap();
+    growing.save().unwrap();
+    let read = read_scans(&folder.path().join("scans"), Unit::M).unwrap();
+    assert_eq!(read.views.len(), views.len());
+    assert!(log(&(read.views[0].object_from_sensor.inverse() * pose(0.9))).norm() < 1e-9);
+    assert_eq!((read.support, read.pose_sigma), (set().support, set().pose_sigma));
+    assert!(document(&folder.path().join("scans"))["views"][0]["verdict"].is_null());
+}

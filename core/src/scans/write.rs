@@ -19,24 +19,70 @@ use std::path::{Component, Path, PathBuf};
 /// [`Error::Io`] if something cannot be written.
 pub fn write_scans(dir: &Path, set: &ScanSet, extras: &[Value]) -> Result<()> {
     check_extras(extras, set.views.len())?;
-    std::fs::create_dir_all(dir).map_err(|e| Error::io("create", dir, e))?;
-    let mut entries: Vec<(String, Pose)> = Vec::with_capacity(set.views.len());
-    for view in &set.views {
+    let head = ScanSet { views: Vec::new(), nominal: set.nominal.clone(), ..*set };
+    let mut folder = ScanFolder::create(dir, head)?;
+    for (i, view) in set.views.iter().enumerate() {
         let file = file_name(&view.name);
-        check_scan(view)?;
-        if entries.iter().any(|(other, _)| *other == file) {
+        if folder.entries.iter().any(|(other, _)| *other == file) {
             return Err(Error::input(format!("two views would be written to {file}: rename one")));
         }
-        write_bytes(&dir.join(&file), &cloud::encode_scan(&view.scan))?;
-        entries.push((file, view.object_from_sensor));
+        folder.put(view, extras.get(i).cloned().unwrap_or_default())?;
     }
-    let head = Head {
-        sensor: set.sensor,
-        pose_sigma: set.pose_sigma,
-        support: set.support,
-        nominal: &set.nominal,
-    };
-    write_json(&dir.join("poses.json"), &new_document(&head, &entries, extras))
+    folder.save()
+}
+
+/// A scan folder that grows while scans are taken.
+pub struct ScanFolder {
+    dir: PathBuf,
+    /// Without views.
+    set: ScanSet,
+    /// File and pose of each view.
+    entries: Vec<(String, Pose)>,
+    extras: Vec<Value>,
+}
+
+impl ScanFolder {
+    /// Creates the folder; `set`, whose own views are passed over, says what is known of all scans.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be created.
+    pub fn create(dir: &Path, set: ScanSet) -> Result<ScanFolder> {
+        std::fs::create_dir_all(dir).map_err(|e| Error::io("create", dir, e))?;
+        Ok(ScanFolder { dir: dir.to_path_buf(), set, entries: Vec::new(), extras: Vec::new() })
+    }
+
+    /// Writes the points of a view, in place of an earlier one of the same name. `extra`, an object or null, joins it
+    /// in `poses.json`, which [`ScanFolder::save`] writes.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the scan's vectors do not fit each other; [`Error::Io`].
+    pub fn put(&mut self, view: &View, extra: Value) -> Result<()> {
+        check_scan(view)?;
+        let file = file_name(&view.name);
+        write_bytes(&self.dir.join(&file), &cloud::encode_scan(&view.scan))?;
+        match self.entries.iter().position(|(other, _)| *other == file) {
+            Some(place) => {
+                self.entries[place].1 = view.object_from_sensor;
+                self.extras[place] = extra;
+            }
+            None => {
+                self.entries.push((file, view.object_from_sensor));
+                self.extras.push(extra);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes `poses.json` with all views so far.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn save(&self) -> Result<()> {
+        let ScanSet { sensor, pose_sigma, support, ref nominal, .. } = self.set;
+        let head = Head { sensor, pose_sigma, support, nominal };
+        let document = new_document(&head, &self.entries, &self.extras);
+        write_json(&self.dir.join("poses.json"), &document)
+    }
 }
 
 /// What a document says of all views.

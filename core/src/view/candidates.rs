@@ -51,8 +51,8 @@ fn made(space: &ViewSpace) -> Vec<Viewpoint> {
         .collect()
 }
 
-/// The direction from the possible inside voxels round `slot` to it, a unit vector: outward. `None` if there are none, or
-/// they lie on all sides.
+/// The direction from the possible inside voxels round `slot` to it, a unit vector: outward. `None` if there are
+/// none, or they lie on all sides.
 pub(crate) fn outward(space: &ViewSpace, slot: u32) -> Option<Vec3> {
     let reach = space.params.neighbourhood as i32;
     let [x, y, z] = space.grid.voxel(slot);
@@ -74,8 +74,8 @@ pub(crate) fn outward(space: &ViewSpace, slot: u32) -> Option<Vec3> {
     (sum.norm() > DECIDED * lengths).then(|| sum.normalize()) // d_i
 }
 
-/// Merges viewpoints within `radius` (metres) and `angle` (radians) of the first of their kind: position and direction
-/// are averaged.
+/// Merges viewpoints within `radius` (metres) and `angle` (radians) of the first of their kind: position and
+/// direction are averaged.
 fn merge(made: &[Viewpoint], radius: f64, angle: f64) -> Vec<Viewpoint> {
     let similar = |a: &Viewpoint, b: &Viewpoint| {
         (a.position - b.position).norm() <= radius && a.direction.dot(&b.direction) >= angle.cos()

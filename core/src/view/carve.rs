@@ -76,8 +76,8 @@ pub(crate) fn carve(
     Carved { hits, hit, freed, passed, behind }
 }
 
-/// The eighth of a voxel (slot * 8 + part) in which each point lies and the point's index, sorted; points outside the grid
-/// or in solid space are left out.
+/// The eighth of a voxel (slot * 8 + part) in which each point lies and the point's index, sorted; points
+/// outside the grid or in solid space are left out.
 fn ends(grid: &BlockGrid<Cell>, scan: &Scan, pose: &Pose) -> Vec<(u64, u32)> {
     let matrix = pose.rotation.to_rotation_matrix();
     let end = |(index, p): (usize, &[f32; 3])| {

@@ -23,8 +23,8 @@ pub(crate) fn predefined(middle: &Vec3, distance: f64) -> Vec<Pose> {
 /// Number of directions of the evenly spread baseline.
 const SPREAD: usize = 64;
 
-/// Views of `middle` from `distance` (metres) spread evenly over the sphere (Fibonacci lattice), each as far as possible from
-/// those before it.
+/// Views of `middle` from `distance` (metres) spread evenly over the sphere (Fibonacci lattice), each as far as
+/// possible from those before it.
 pub(crate) fn spread(middle: &Vec3, distance: f64) -> Vec<Pose> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let mut left: Vec<Vec3> = (0..SPREAD)

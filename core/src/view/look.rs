@@ -39,8 +39,8 @@ impl Met {
     }
 }
 
-/// Looks from `pose`; calls `visit(slot, cell, direction of the first ray)` once for each voxel penetrated that is not
-/// free or solid. A ray ends in the first occupied voxel, else at the sensor's range.
+/// Looks from `pose`; calls `visit(slot, cell, direction of the first ray)` once for each voxel penetrated that
+/// is not free or solid. A ray ends in the first occupied voxel, else at the sensor's range.
 pub(crate) fn look(
     space: &ViewSpace,
     eye: &Eye,

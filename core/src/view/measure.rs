@@ -1,8 +1,8 @@
 //! What a simulated scan is worth.
 //!
-//! Wiedemann 2014, §2.2.1: `q = w_occ N + w_ins M + w_unk O`. Kriegel et al. 2012: entropy of the voxels seen. Massios &
-//! Fisher 1998: hidden voxels seen, and `f = 1/|M| sum (1 - q_i) |v . n_i|`. Khalfaoui et al. 2013 after Loriot et al. 2008: angle to
-//! the mass vector sum, `w = theta / theta_max`.
+//! Wiedemann 2014, §2.2.1: `q = w_occ N + w_ins M + w_unk O`. Kriegel et al. 2012: entropy of the voxels seen.
+//! Massios & Fisher 1998: hidden voxels seen, and `f = 1/|M| sum (1 - q_i) |v . n_i|`. Khalfaoui et al. 2013
+//! after Loriot et al. 2008: angle to the mass vector sum, `w = theta / theta_max`.
 
 use super::candidates::outward;
 use super::look::{Eye, look};

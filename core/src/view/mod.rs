@@ -1,8 +1,8 @@
 //! Next best view (Wiedemann 2014, §2.2.1).
 //!
 //! [`ViewSpace`] takes scans in and knows of each voxel whether it is free, a surface, or hidden behind one;
-//! [`next_view`] makes candidates from it, simulates a scan from each, and asks the robot for the best. Candidates and
-//! gains are functions of the space alone, so that a plan can be repeated from the scans.
+//! [`next_view`] makes candidates from it, simulates a scan from each, and asks the robot for the best.
+//! Candidates and gains are functions of the space alone, so that a plan can be repeated from the scans.
 
 mod candidates;
 mod carve;
@@ -33,3 +33,6 @@ pub(crate) fn looking_along(position: &Vec3, direction: &Vec3) -> Pose {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod loop_tests;

@@ -62,12 +62,12 @@ crate::params! {
         utility: Utility = Utility::Gain;
         /// Time of a scan, added to that of the motion where gain per second counts.
         scan_time: f64 = 5.0, in [0.1, 1000.0], unit "s";
-        /// Share of a candidate's rays into the object that must meet known surface, so that the scan can be registered.
+        /// Share of the rays into the object that must meet known surface, for registration.
         min_overlap: f64 = 0.2, in [0.0, 1.0];
-        /// Planning ends when no view gains more than this share of the known surface voxels; 0 goes on to the last voxel.
+        /// Planning ends when no view gains this share of the known surface voxels; 0 wants the last one.
         min_gain: f64 = 0.005, in [0.0, 1.0];
         /// Scans that look at a voxel in vain before it counts as not measurable.
-        max_tries: usize = 2, in [1, 100];
+        max_tries: usize = 3, in [1, 100];
         /// Scans that must see through a voxel for each that hit it, before it is no surface.
         hit_weight: f64 = 2.0, in [0.1, 100.0];
         /// Points with fewer of the same scan in their voxel and those around it are outliers and left out.

@@ -72,8 +72,8 @@ pub struct Plan {
 
 type Reach<'a> = &'a mut dyn FnMut(&Pose) -> Result<ReachedView, String>;
 
-/// Plans the next view. `reach` says whether and how the robot can take a viewpoint, or why it cannot; it is asked in the
-/// order of worth until no better answer is possible.
+/// Plans the next view. `reach` says whether and how the robot can take a viewpoint, or why it cannot; it is
+/// asked in the order of worth until no better answer is possible.
 pub fn next_view(space: &ViewSpace, reach: Reach<'_>) -> Plan {
     let counts = space.counts();
     if counts.occupied == 0 {
@@ -93,8 +93,9 @@ pub fn next_view(space: &ViewSpace, reach: Reach<'_>) -> Plan {
     Choice { space, judge, floor: floor(space, &counts) }.choose(considered, counts, reach)
 }
 
-/// The least weighted number of new voxels that makes a view worth taking. A surface cut into voxels always leaves some
-/// whose corner it barely touches, and each scan adds such; without a floor they are looked for one by one.
+/// The least weighted number of new voxels that makes a view worth taking. A surface cut into voxels always
+/// leaves some whose corner it barely touches, and each scan adds such; without a floor they are looked for one
+/// by one.
 fn floor(space: &ViewSpace, counts: &Counts) -> f64 {
     (space.params.min_gain * counts.occupied as f64).max(f64::MIN_POSITIVE)
 }

@@ -94,8 +94,8 @@ impl ViewSpace {
         Ok(ViewSpace { grid, params: params.clone(), sensor, roi, scans: 0, used, marked })
     }
 
-    /// Marks voxels whose centres lie in one of `boxes` (object frame, metres) as known to be solid. They stop rays, ask
-    /// for nothing and give no directions; points in them are ignored.
+    /// Marks voxels whose centres lie in one of `boxes` (object frame, metres) as known to be solid. They stop
+    /// rays, ask for nothing and give no directions; points in them are ignored.
     pub fn exclude(&mut self, boxes: &[Aabb]) {
         self.exclude_where(|center| boxes.iter().any(|b| b.contains(center)));
     }
@@ -175,8 +175,8 @@ impl ViewSpace {
         Some(self.grid.get(self.grid.slot_at(point)?).state)
     }
 
-    /// Centres (object frame, metres) and states of all voxels that are neither unknown nor free, in a fixed order, and for
-    /// each whether it is satisfied (occupied with its minimum of points).
+    /// Centres (object frame, metres) and states of all voxels that are neither unknown nor free, in a fixed
+    /// order, and for each whether it is satisfied (occupied with its minimum of points).
     pub fn voxels(&self) -> Vec<(Vec3, State, bool)> {
         let told = |cell: &Cell| !matches!(cell.state, State::Unknown | State::Free);
         let told = self.grid.iter().filter(|(_, cell)| told(cell));
@@ -233,8 +233,8 @@ impl ViewSpace {
         matches!(cell.state, State::PossibleInside | State::PossibleBorder) && !self.given_up(cell)
     }
 
-    /// Middle of the surface measured so far, object frame, metres; that of the region of interest if there is none. The
-    /// outermost fiftieth on each side is left out as likely noise.
+    /// Middle of the surface measured so far, object frame, metres; that of the region of interest if there is
+    /// none. The outermost fiftieth on each side is left out as likely noise.
     pub(crate) fn middle(&self) -> Vec3 {
         let occupied = self.grid.iter().filter(|(_, cell)| cell.state == State::Occupied);
         let centers: Vec<Vec3> = occupied.map(|(slot, _)| self.grid.center(slot)).collect();
@@ -317,8 +317,9 @@ impl ViewSpace {
         }
     }
 
-    /// Looks at the space from where the scan was taken: what still asks there was looked at in vain, unless it got points.
-    /// Only what a candidate's simulated scan would count gets a try, so that no view can gain for ever.
+    /// Looks at the space from where the scan was taken: what still asks there was looked at in vain, unless it
+    /// got points. Only what a candidate's simulated scan would count gets a try, so that no view can gain for
+    /// ever.
     fn note_looks(&mut self, carved: &Carved, pose: &Pose) {
         let eye = Eye::new(&self.sensor, self.edge() / 2.0);
         let mut seen = SlotSet::new(self.grid.slots());

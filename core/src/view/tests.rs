@@ -1,146 +1,239 @@
 use super::*;
-use crate::geometry::{SensorModel, StereoModel, StriperModel, Surface};
-use crate::simulate::{NoiseFamily, SimulateParams, Simulator, objects};
-use std::time::Instant;
+use crate::geometry::{Aabb, Scan, SensorModel, StereoModel};
 
-/// A closed loop before a simulated object.
-struct Loop {
-    simulator: Simulator,
-    surface: Surface,
-    truth: crate::mesh::Mesh,
-    family: NoiseFamily,
+/// A sensor at the height 0.65 m above the middle of the region, looking down.
+fn above() -> Pose {
+    looking_along(&(Vec3::z() * 0.65), &-Vec3::z())
 }
 
-impl Loop {
-    fn new(object: &str, family: NoiseFamily) -> Loop {
-        let truth = objects::make(object).unwrap();
-        let params = SimulateParams { family, ..SimulateParams::default() };
-        let surface = Surface::new(&truth.vertices, &truth.triangles).unwrap();
-        Loop { simulator: Simulator::new(&truth, &params, 1).unwrap(), surface, truth, family }
-    }
-
-    fn sensor(&self) -> SensorModel {
-        if self.family.is_stereo() {
-            SensorModel::Stereo(StereoModel::GUPPY)
-        } else {
-            SensorModel::Striper(StriperModel::SCANCONTROL)
-        }
-    }
-
-    fn space(&self, params: &ViewParams) -> ViewSpace {
-        let mut roi = self.truth.aabb().padded(0.03);
-        roi.min.z = -0.01;
-        let mut space = ViewSpace::new(self.sensor(), roi, params).unwrap();
-        space.exclude_below(0.0);
-        space
-    }
-
-    /// Points of the true surface that any of 200 views above the table sees without noise.
-    fn observable(&self) -> Vec<Vec3> {
-        let views = self.simulator.view_poses(400).into_iter().take(200);
-        let eyes: Vec<Vec3> = views.map(|pose| pose.translation.vector).collect();
-        let seen = |(i, p): (usize, &Vec3)| {
-            let normal = self.truth.normals[i];
-            eyes.iter().any(|eye| {
-                let (sight, far) = ((p - eye).normalize(), (p - eye).norm());
-                sight.dot(&normal) < -0.25
-                    && self.surface.cast_ray(eye, &sight, far - 1e-4).is_none()
-            })
-        };
-        let points = self.truth.vertices.iter().enumerate().step_by(17);
-        points.filter(|(i, p)| seen((*i, p))).map(|(_, p)| *p).collect()
-    }
+fn roi() -> Aabb {
+    Aabb { min: Vec3::new(-0.1, -0.1, -0.1), max: Vec3::new(0.1, 0.1, 0.1) }
 }
 
-fn satisfied_share(space: &ViewSpace, observable: &[Vec3]) -> f64 {
-    let edge = space.edge();
-    let near = |p: &Vec3| {
-        let voxel = crate::voxel::voxel_of(p, edge);
-        (0..27).any(|i: i32| {
-            let next = [voxel[0] + i % 3 - 1, voxel[1] + i / 3 % 3 - 1, voxel[2] + i / 9 - 1];
-            space.grid.slot(next).is_some_and(|slot| {
-                let cell = space.grid.get(slot);
-                cell.state == State::Occupied && cell.points as usize >= space.params.min_points
-            })
-        })
+fn space(params: &ViewParams) -> ViewSpace {
+    let params = ViewParams { voxel_edge: 0.005, ..params.clone() };
+    ViewSpace::new(SensorModel::Stereo(StereoModel::GUPPY), roi(), &params).unwrap()
+}
+
+/// A scan from [`above`] of a square plate (half its edge, metres) at the height `z`, a point each 1 mm.
+fn plate(half: f64, z: f64) -> Scan {
+    let n = (half / 1e-3).round() as i32;
+    let steps = (-n..=n).flat_map(|x| (-n..=n).map(move |y| (x, y)));
+    let at = |(x, y)| [f64::from(x) * 1e-3, f64::from(y) * 1e-3, 0.65 - z];
+    Scan { points: steps.map(at).map(|p| p.map(|v| v as f32)).collect(), ..Scan::default() }
+}
+
+fn any(pose: &Pose) -> Result<ReachedView, String> {
+    Ok(ReachedView { pose: *pose, duration: 1.0 })
+}
+
+#[test]
+fn a_scan_leaves_free_space_before_surface_before_hidden_space_with_a_border() {
+    let mut space = space(&ViewParams::default());
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    let state = |x: f64, z: f64| space.state_at(&Vec3::new(x, 0.001, z)).unwrap();
+    assert_eq!(state(0.0, 0.06), State::Free);
+    assert_eq!(state(0.0, 0.0061), State::Free);
+    assert_eq!(state(0.0, 0.002), State::Occupied);
+    assert_eq!(state(0.0, -0.003), State::PossibleInside);
+    assert_eq!(state(0.0, -0.09), State::PossibleInside);
+    assert_eq!(state(0.09, 0.0), State::Unknown);
+    let border = (0..20)
+        .map(|i| f64::from(i) * 5e-3 + 1e-3)
+        .find(|x| state(*x, -0.02) == State::PossibleBorder);
+    assert!((0.03..0.04).contains(&border.unwrap()), "{border:?}");
+    assert_eq!(space.state_at(&Vec3::x()), None);
+    let counts = space.counts();
+    assert_eq!(counts.satisfied, counts.occupied);
+    let told = counts.free + counts.occupied + counts.possible_inside + counts.possible_border;
+    assert_eq!(counts.unknown + told, 41usize.pow(3));
+}
+
+#[test]
+fn outliers_are_left_out_and_a_false_surface_gives_way_to_evidence() {
+    let mut space = space(&ViewParams::default());
+    let mut scan = plate(0.03, -0.05);
+    scan.points.push([0.0, 0.0, 0.6]);
+    space.integrate(&scan, &above()).unwrap();
+    let state = |space: &ViewSpace, z: f64| space.state_at(&Vec3::new(0.001, 0.001, z)).unwrap();
+    assert_eq!(state(&space, 0.05), State::Free, "one point alone is no surface");
+    space.integrate(&plate(0.01, 0.052), &above()).unwrap();
+    assert_eq!(state(&space, 0.052), State::Occupied);
+    let passes = |n: usize, space: &mut ViewSpace| {
+        (0..n).for_each(|_| space.integrate(&plate(0.03, -0.05), &above()).unwrap());
     };
-    observable.iter().filter(|p| near(p)).count() as f64 / observable.len() as f64
+    passes(1, &mut space);
+    assert_eq!(state(&space, 0.052), State::Occupied, "two scans saw through it, one hit it");
+    passes(1, &mut space);
+    assert_eq!(state(&space, 0.052), State::Free, "three saw through it");
+    assert_eq!(state(&space, -0.049), State::Occupied);
 }
 
-struct Run {
-    views: usize,
-    coverage: Vec<f64>,
-    integrate: f64,
-    plan: f64,
-    last: Plan,
-}
-
-fn run(setup: &Loop, params: &ViewParams, observable: &[Vec3], most: usize) -> Run {
-    let mut space = setup.space(params);
-    let mut above = |pose: &Pose| {
-        if pose.translation.z < 0.0 {
-            return Err("below the table".to_owned());
-        }
-        Ok(ReachedView { pose: *pose, duration: 1.0 })
+#[test]
+fn solid_space_neither_asks_nor_is_asked_for() {
+    let mut space = space(&ViewParams::default());
+    space.exclude_below(0.0);
+    space.exclude(&[Aabb { min: Vec3::new(-0.1, -0.1, -0.1), max: Vec3::new(-0.05, 0.1, 0.1) }]);
+    let before = space.counts().excluded;
+    assert_eq!(before, 41 * 41 * 20 + 10 * 40 * 20);
+    space.integrate(&plate(0.08, 0.012), &above()).unwrap();
+    let counts = space.counts();
+    assert_eq!(counts.excluded, before);
+    assert!(space.voxels().iter().all(|(c, s, _)| c.z > 0.0 || *s == State::Excluded));
+    assert_eq!(space.state_at(&Vec3::new(-0.07, 0.0, 0.012)), Some(State::Excluded));
+    // Through the solid side nothing is seen.
+    let judge = measure::Judge::new(&space);
+    let gain = |x: f64| {
+        let pose = looking_along(&Vec3::new(x, 0.0, 0.006), &Vec3::new(-x.signum(), 0.0, 0.0));
+        judge.gain(&pose, &mut judge.set())
     };
-    let (mut integrate, mut plan_time, mut coverage) = (0.0, 0.0, Vec::new());
-    loop {
-        let start = Instant::now();
-        let plan = next_view(&space, &mut above);
-        plan_time += start.elapsed().as_secs_f64();
-        let views = coverage.len();
-        let Some(view) = plan.chosen.as_ref().filter(|_| views < most) else {
-            let n = views as f64;
-            return Run {
-                views,
-                coverage,
-                integrate: integrate / n,
-                plan: plan_time / n,
-                last: plan,
+    let (through, open) = (gain(-0.6), gain(0.6));
+    assert!(through.hidden == 0 && open.hidden > 10, "{through:?} {open:?}");
+}
+
+#[test]
+fn what_is_looked_at_in_vain_stops_asking() {
+    let params = ViewParams { max_tries: 3, ..ViewParams::default() };
+    let mut space = space(&params);
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    let side = looking_along(&(Vec3::x() * 0.65), &-Vec3::x());
+    let nothing = Scan { points: vec![[f32::NAN; 3]; 10], ..Scan::default() };
+    let asking = |space: &ViewSpace| {
+        let judge = measure::Judge::new(space);
+        judge.gain(&side, &mut judge.set()).hidden
+    };
+    let first = asking(&space);
+    assert!(first > 1000, "{first}");
+    // The border was looked at from above once already.
+    space.integrate(&nothing, &side).unwrap();
+    assert_eq!(asking(&space), first);
+    space.integrate(&nothing, &side).unwrap();
+    space.integrate(&nothing, &side).unwrap();
+    assert_eq!(asking(&space), 0);
+    assert!(space.counts().unresolved >= first);
+}
+
+#[test]
+fn rebuilding_from_the_scans_gives_the_same_space() {
+    let scans = [(plate(0.03, 0.002), above()), (plate(0.02, 0.012), above())];
+    let mut first = space(&ViewParams::default());
+    first.exclude_below(-0.05);
+    let mut moved = space(&ViewParams::default());
+    moved.exclude_below(-0.05);
+    for (scan, pose) in &scans {
+        first.integrate(scan, pose).unwrap();
+        let off = Pose::translation(0.004, 0.0, 0.02) * pose;
+        moved.integrate(scan, &off).unwrap();
+    }
+    assert_ne!(first.voxels(), moved.voxels());
+    moved.mark_used(&looking_along(&Vec3::x(), &-Vec3::x()));
+    let poses: Vec<(&Scan, Pose)> = scans.iter().map(|(scan, pose)| (scan, *pose)).collect();
+    moved.rebuild(&poses).unwrap();
+    assert_eq!((first.voxels(), first.counts()), (moved.voxels(), moved.counts()));
+    assert_eq!((moved.scans(), moved.used().count()), (2, 3));
+}
+
+#[test]
+fn the_first_view_is_the_first_predefined_one_that_can_be_reached() {
+    let mut space = space(&ViewParams::default());
+    let mut left_only = |pose: &Pose| match pose.translation.x < -0.1 {
+        true => any(pose),
+        false => Err("arm too short".to_owned()),
+    };
+    let plan = next_view(&space, &mut left_only);
+    let chosen = plan.chosen.unwrap();
+    assert!(chosen.pose.translation.x < -0.1 && chosen.candidate > 0);
+    assert!(plan.candidates[..chosen.candidate].iter().all(|c| c.asked && !c.reachable));
+    assert_eq!(plan.candidates[0].reason, "arm too short");
+    // Nothing measured: the next one, until none is left.
+    let mut views = 0;
+    let done = loop {
+        match next_view(&space, &mut |pose| any(pose)) {
+            Plan { chosen: Some(view), .. } => {
+                space.integrate(&Scan::default(), &view.pose).unwrap();
+                views += 1;
+            }
+            plan => break plan.done.unwrap(),
+        }
+    };
+    assert_eq!(views, 42);
+    assert!(done.contains("no surface was measured") && done.contains("42 scans"), "{done}");
+}
+
+#[test]
+fn a_plan_takes_the_best_that_can_be_reached_and_says_why_not_the_others() {
+    let mut space = space(&ViewParams::default());
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    let free = next_view(&space, &mut |pose| any(pose));
+    let best = free.chosen.unwrap();
+    assert_eq!(free.candidates.iter().filter(|c| c.asked).count(), 1);
+    assert!(best.gain > 0.0 && best.expected_new > 100 && free.done.is_none());
+    let mut no_best = |pose: &Pose| match *pose == best.pose {
+        true => Err("collides".to_owned()),
+        false => any(pose),
+    };
+    let other = next_view(&space, &mut no_best).chosen.unwrap();
+    assert!(other.candidate > 0 && other.gain <= best.gain);
+    // A pose from which nothing is seen is not taken as the candidate that it stands for.
+    let away = looking_along(&(Vec3::x() * 2.0), &Vec3::x());
+    let plan = next_view(&space, &mut |_| Ok(ReachedView { pose: away, duration: 1.0 }));
+    assert!(plan.chosen.is_none() && plan.candidates[0].reason.contains("nothing new"));
+    let plan = next_view(&space, &mut |_| Err("no".to_owned()));
+    assert!(plan.done.unwrap().contains("can be taken"));
+    assert!(plan.candidates.iter().all(|c| c.asked && c.reason == "no"));
+}
+
+#[test]
+fn gain_per_second_prefers_what_is_near() {
+    let params = ViewParams { utility: Utility::PerSecond, ..ViewParams::default() };
+    let mut space = space(&params);
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    let best = next_view(&space, &mut |pose| any(pose)).chosen.unwrap();
+    let mut slow_to_best = |pose: &Pose| {
+        let duration = if *pose == best.pose { 1000.0 } else { 2.0 };
+        Ok(ReachedView { pose: *pose, duration })
+    };
+    let near = next_view(&space, &mut slow_to_best).chosen.unwrap();
+    assert!(near.pose != best.pose && near.duration < 3.0);
+}
+
+#[test]
+fn every_measure_finds_a_view_and_views_used_are_not_repeated() {
+    for word in <Measure as crate::params::ParamValue>::CHOICES {
+        let mut params = ViewParams::default();
+        params.set("measure", &serde_json::json!(word)).unwrap();
+        let mut space = space(&params);
+        space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+        let mut taken: Vec<Pose> = vec![above()];
+        for _ in 0..4 {
+            let view = next_view(&space, &mut |pose| any(pose)).chosen.unwrap();
+            let near = |old: &Pose| {
+                let angle = (old.rotation * Vec3::z()).angle(&(view.pose.rotation * Vec3::z()));
+                let apart = (old.translation.vector - view.pose.translation.vector).norm();
+                angle < params.used_angle && apart < params.used_distance * 0.65
             };
-        };
-        let scan = setup.simulator.scan(views, &view.pose);
-        let start = Instant::now();
-        space.integrate(&scan.scan, &scan.true_pose).unwrap();
-        integrate += start.elapsed().as_secs_f64();
-        coverage.push(satisfied_share(&space, observable));
+            assert!(!taken.iter().any(near), "{word}");
+            space.mark_used(&view.pose);
+            taken.push(view.pose);
+        }
     }
 }
 
 #[test]
-#[ignore = "a measurement, not a check"]
-fn closed_loops() {
-    for family in [NoiseFamily::P2K, NoiseFamily::P3] {
-        for object in ["filter", "coffee", "mug"] {
-            let setup = Loop::new(object, family);
-            let observable = setup.observable();
-            for measure in [
-                Measure::Thesis,
-                Measure::Entropy,
-                Measure::MassiosFisher,
-                Measure::MassVector,
-                Measure::Random,
-                Measure::Sphere,
-            ] {
-                let params = ViewParams { measure, ..ViewParams::default() };
-                let run = run(&setup, &params, &observable, 60);
-                let share = |n: usize| run.coverage.get(n - 1).copied().unwrap_or(f64::NAN) * 100.0;
-                let to = |c: f64| run.coverage.iter().position(|x| *x >= c).map_or(0, |i| i + 1);
-                eprintln!(
-                    "{family:?} {object} {measure:?}: {} views, coverage {:.1} % (after 4: {:.1}, 8: {:.1}, 12: {:.1}); 95 % after {}, 99 % after {}; integrate {:.0} ms, plan {:.0} ms; {:?} {:?}",
-                    run.views,
-                    run.coverage.last().unwrap() * 100.0,
-                    share(4),
-                    share(8),
-                    share(12),
-                    to(0.95),
-                    to(0.99),
-                    run.integrate * 1e3,
-                    run.plan * 1e3,
-                    run.last.done,
-                    run.last.counts,
-                );
-            }
-        }
-    }
+fn broken_input_is_refused_with_what_to_change() {
+    let mut space = space(&ViewParams::default());
+    let mut pose = above();
+    pose.translation.x = f64::NAN;
+    let error = space.integrate(&plate(0.01, 0.0), &pose).unwrap_err().to_string();
+    assert!(error.contains("not finite"), "{error}");
+    let scan = Scan { origins: vec![[0.0; 3]; 3], ..plate(0.01, 0.0) };
+    let error = space.integrate(&scan, &above()).unwrap_err().to_string();
+    assert!(error.contains("441 points but 3 ray origins"), "{error}");
+    assert_eq!((space.scans(), space.counts().occupied), (0, 0));
+    let striper = SensorModel::Stereo(StereoModel::GUPPY);
+    assert!(ViewSpace::new(striper, Aabb::EMPTY, &ViewParams::default()).is_err());
+    // A scan without a return, one outside the region and a point at the sensor itself are no errors.
+    let odd = [[f32::NAN; 3], [9.0, 9.0, 9.0], [0.0; 3], [f32::INFINITY; 3], [1e30; 3]];
+    space.integrate(&Scan { points: odd.to_vec(), ..Scan::default() }, &above()).unwrap();
+    assert_eq!(space.counts().unknown, 41usize.pow(3));
 }

@@ -1,7 +1,8 @@
 //! Sparse voxel space (Wiedemann 2014, §2.1): space cut into cubes of edge `l`.
 //!
-//! [`VoxelSpace`] holds one value a voxel in blocks that exist only where something was written; [`BlockGrid`] does
-//! the same within a box, faster, and with [`SlotSet`] for sets of its voxels; [`walk`] lists the voxels along a ray; [`CellIndex`] sorts points into voxels for searches within a radius.
+//! [`VoxelSpace`] holds one value a voxel in blocks that exist only where something was written; [`BlockGrid`]
+//! does the same within a box, faster, and with [`SlotSet`] for sets of its voxels; [`walk`] lists the voxels
+//! along a ray; [`CellIndex`] sorts points into voxels for searches within a radius.
 
 mod cells;
 mod grid;

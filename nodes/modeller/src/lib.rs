@@ -1,1 +1,92 @@
-//! Runs the modelling loop.
+//! Runs the modelling loop: the only node that knows the order of things.
+//!
+//! The action `model_object` plans a view, moves, scans and waits for the verdict until no view is left, then has all
+//! poses refined, the scans combined and the mesh made. `modelling_status` tells where it stands; `~/pause`,
+//! `~/resume` and the action's cancel steer it. The order itself is [`puffer_core::session`].
+
+mod goal;
+mod inbox;
+mod journal;
+mod params;
+mod partners;
+mod runner;
+
+pub use params::{ModellerParams, Noise, Params};
+
+use anyhow::Result;
+use goal::Modeller;
+use inbox::Inbox;
+use partners::Partners;
+use puffer_core::session::Event;
+use puffer_msgs::action::{ModelObject, ModelObjectGoal};
+use puffer_msgs::msg::RegisteredScan;
+use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
+use puffer_shell::bulk::{BulkSubscription, Delivery};
+use puffer_shell::{Goal, Node, Profile, RosArgs, Stop};
+use std::sync::{Arc, Mutex};
+
+/// Runs the modeller until `stop`.
+///
+/// # Errors
+/// Parameters that do not fit, or no network.
+pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
+    let node: Node<Params> = Node::start("modeller", args, stop.clone()).await?;
+    let scans: BulkSubscription<RegisteredScan> =
+        node.bulk_subscribe("registered_scan", Delivery::Every)?;
+    let modeller = Arc::new(Modeller {
+        partners: Partners::new(&node)?,
+        inbox: Arc::new(Inbox::default()),
+        status: node.publisher("modelling_status", Profile::Standard)?,
+        controls: Mutex::new(None),
+        node: node.clone(),
+    });
+    serve_goals(&node, &modeller)?;
+    serve_control(&node, &modeller, "~/pause", Event::Pause)?;
+    serve_control(&node, &modeller, "~/resume", Event::Resume)?;
+    tracing::info!("ready");
+    loop {
+        match stop.or(scans.next()).await {
+            None => break,
+            Some(Ok(scan)) => modeller.inbox.put(scan),
+            Some(Err(error)) => tracing::warn!("{error}"),
+        }
+    }
+    // A running session writes its report before the node goes.
+    while modeller.is_busy() {
+        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    }
+    Ok(())
+}
+
+fn serve_goals(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()> {
+    let (asked, modeller) = (Arc::clone(modeller), Arc::clone(modeller));
+    node.action_server::<ModelObject, _, _, _>(
+        "model_object",
+        move |_: &ModelObjectGoal| {
+            if asked.is_busy() {
+                Err("another object is being modelled".to_owned())
+            } else {
+                Ok(())
+            }
+        },
+        move |goal: Goal<ModelObject>| {
+            let modeller = Arc::clone(&modeller);
+            async move { modeller.model(goal).await }
+        },
+    )
+}
+
+fn serve_control(
+    node: &Node<Params>,
+    modeller: &Arc<Modeller>,
+    name: &str,
+    event: Event,
+) -> Result<()> {
+    let modeller = Arc::clone(modeller);
+    node.serve::<Trigger, _, _>(name, move |_| {
+        let success = modeller.control(event.clone());
+        let message =
+            if success { String::new() } else { "no object is being modelled".to_owned() };
+        async move { TriggerResponse { success, message } }
+    })
+}

@@ -1,6 +1,6 @@
 //! All ROS glue of puffer's nodes, and nothing else: arguments, names, parameters, logs, topics, services,
-//! actions, transforms, time, diagnostics. A node takes a message, calls one function of core and publishes
-//! the result; everything about ROS in between is here.
+//! actions, transforms, time, diagnostics, bulk transport. A node takes a message, calls one function of core and
+//! publishes the result; everything about ROS in between is here.
 //!
 //! ```no_run
 //! # use puffer_shell::{Node, NoParams, Profile, RosArgs, Stop};
@@ -19,13 +19,17 @@ mod action;
 mod args;
 pub mod bag;
 pub mod bulk;
+mod clock;
 pub mod convert;
+mod dds;
 mod diagnostics;
 mod entry;
-mod interfaces;
+mod logging;
 mod names;
 mod node;
+mod params;
 mod qos;
+pub mod scans;
 mod service;
 mod stamp;
 mod stop;
@@ -35,9 +39,10 @@ mod topic;
 pub use action::{ActionClient, Goal, GoalHandle, Outcome};
 pub use args::{RosArgs, ServiceMapping};
 pub use diagnostics::{Diagnostics, Health};
-pub use entry::main;
-pub use interfaces::{Action, Message, NoParams, Service};
+pub use entry::{main, main_with};
 pub use node::Node;
+pub use params::NoParams;
+pub use puffer_msgs::{Action, Interface, Service};
 pub use qos::Profile;
 pub use service::{CallError, Client};
 pub use stamp::Stamp;

@@ -30,8 +30,8 @@ impl Profile {
 }
 
 /// Requests and replies: as rmw_qos_profile_services_default.
-pub(crate) fn service() -> QosPolicies {
-    build(true, Durability::Volatile, 10)
+pub(crate) fn service(depth: i32) -> QosPolicies {
+    build(true, Durability::Volatile, depth)
 }
 
 /// `/rosout` and `/parameter_events`: as rclcpp's, 1,000 samples deep.
@@ -62,4 +62,9 @@ pub(crate) fn build(reliable: bool, durability: Durability, depth: i32) -> QosPo
         .deadline(Deadline(Duration::INFINITE))
         .lifespan(Lifespan { duration: Duration::INFINITE })
         .build()
+}
+
+/// What subscribers of `/tf_static` ask for: a latched message from each publisher.
+pub(crate) fn static_transforms() -> QosPolicies {
+    build(true, Durability::TransientLocal, 100)
 }

@@ -1,5 +1,6 @@
 //! Time stamps.
 
+use puffer_msgs::builtin_interfaces::msg::Time;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// A point in time: nanoseconds since 1970, or since the start of a simulation.
@@ -69,6 +70,19 @@ impl std::ops::Sub<Duration> for Stamp {
     type Output = Stamp;
     fn sub(self, duration: Duration) -> Stamp {
         Stamp(self.0.saturating_sub(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX)))
+    }
+}
+
+impl From<Time> for Stamp {
+    fn from(time: Time) -> Stamp {
+        Stamp::new(time.sec, time.nanosec)
+    }
+}
+
+impl From<Stamp> for Time {
+    fn from(stamp: Stamp) -> Time {
+        let (sec, nanosec) = stamp.parts();
+        Time { sec, nanosec }
     }
 }
 

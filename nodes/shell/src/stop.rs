@@ -72,7 +72,7 @@ impl Stop {
     }
 
     /// A flag of its own that follows this one, but whose setting does not set this one.
-    pub(crate) fn child(&self) -> Self {
+    pub fn child(&self) -> Self {
         let child = Self::new();
         let (parent, flag) = (self.clone(), child.clone());
         tokio::spawn(async move {

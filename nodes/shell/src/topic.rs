@@ -1,68 +1,156 @@
 //! Publishers and subscriptions.
 
-use crate::Message;
-use anyhow::{Result, bail};
+use crate::Stop;
+use crate::dds::{Dds, Reader, Sample, Writer, encode, type_name};
+use anyhow::{Context, Result, anyhow, bail};
+use puffer_msgs::Interface;
+use rustdds::QosPolicies;
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::time::Duration;
 
+fn dds_name(topic: &str) -> String {
+    format!("rt{topic}")
+}
+
 /// Publishes messages; clones share it.
-#[derive(Clone)]
 pub struct Publisher<M> {
+    writer: Arc<Writer>,
+    topic: Arc<str>,
     message: PhantomData<fn(M)>,
 }
 
-impl<M: Message> Publisher<M> {
+impl<M> Clone for Publisher<M> {
+    fn clone(&self) -> Self {
+        Self {
+            writer: Arc::clone(&self.writer),
+            topic: Arc::clone(&self.topic),
+            message: PhantomData,
+        }
+    }
+}
+
+impl<M: Interface> Publisher<M> {
+    pub(crate) fn new(dds: &Dds, topic: &str, qos: &QosPolicies) -> Result<Self> {
+        let kind = type_name(M::PACKAGE, M::KIND, M::NAME, "");
+        let writer = Arc::new(dds.writer(&dds_name(topic), &kind, qos)?);
+        Ok(Self { writer, topic: topic.into(), message: PhantomData })
+    }
+
     /// Publishes; waits at most 100 ms where the queue is full.
     ///
     /// # Errors
     /// The message cannot be serialised, or the queue stayed full.
     pub fn publish(&self, message: &M) -> Result<()> {
-        let _ = message;
-        bail!("not yet")
+        let written = encode(message).and_then(|body| self.writer.write(body, None));
+        written.map(drop).map_err(|error| anyhow!("{}: {error}", self.topic))
     }
 
     /// Readers that are matched now.
     pub fn readers(&self) -> usize {
-        0
+        self.writer.matches().count(self.writer.guid())
+    }
+
+    /// Waits until at least `count` readers are matched.
+    ///
+    /// # Errors
+    /// They are not within `deadline` (wall time).
+    pub async fn wait_for_readers(&self, count: usize, deadline: Duration) -> Result<()> {
+        let matched = self.writer.matches().wait(|_| self.readers() >= count);
+        tokio::time::timeout(deadline, matched).await.map_err(|_| {
+            anyhow!(
+                "{}: {} of {count} readers within {:.1} s",
+                self.topic,
+                self.readers(),
+                deadline.as_secs_f64()
+            )
+        })
     }
 
     /// The topic's absolute name.
     pub fn topic(&self) -> &str {
-        ""
+        &self.topic
     }
 }
 
 /// Receives messages.
 pub struct Subscription<M> {
+    reader: Reader,
+    topic: String,
+    stop: Stop,
     message: PhantomData<fn() -> M>,
 }
 
-impl<M: Message> Subscription<M> {
-    /// The next message, or `None` once the node stops. A message that cannot be decoded is logged and left out.
+impl<M: Interface> Subscription<M> {
+    pub(crate) fn new(dds: &Dds, topic: &str, qos: &QosPolicies, stop: Stop) -> Result<Self> {
+        let kind = type_name(M::PACKAGE, M::KIND, M::NAME, "");
+        let reader = dds.reader(&dds_name(topic), &kind, qos)?;
+        Ok(Self { reader, topic: topic.to_owned(), stop, message: PhantomData })
+    }
+
+    /// The next message, or `None` once the node stops. A message that cannot be decoded is logged and left
+    /// out.
     pub async fn next(&mut self) -> Option<M> {
-        None
+        loop {
+            let sample = self.stop.or(self.reader.next()).await?;
+            if let Some(message) = self.decode(sample) {
+                return Some(message);
+            }
+        }
     }
 
     /// The next message.
     ///
     /// # Errors
-    /// Nothing came within `deadline`, or the node stops.
+    /// Nothing came within `deadline` (wall time), or the node stops.
     pub async fn next_within(&mut self, deadline: Duration) -> Result<M> {
-        bail!("not yet {deadline:?}")
+        match tokio::time::timeout(deadline, self.next()).await {
+            Ok(Some(message)) => Ok(message),
+            Ok(None) => bail!("{}: the node stops", self.topic),
+            Err(_) => bail!(
+                "nothing on {} within {:.1} s ({} publishers matched)",
+                self.topic,
+                deadline.as_secs_f64(),
+                self.writers()
+            ),
+        }
     }
 
     /// A message that has come already.
     pub fn try_next(&mut self) -> Option<M> {
-        None
+        loop {
+            let sample = self.reader.try_next().transpose()?;
+            if let Some(message) = self.decode(sample) {
+                return Some(message);
+            }
+        }
+    }
+
+    fn decode(&self, sample: Result<Sample, String>) -> Option<M> {
+        sample
+            .and_then(|sample| sample.raw.decode())
+            .inspect_err(|error| tracing::warn!("{}: message ignored: {error}", self.topic))
+            .ok()
     }
 
     /// Writers that are matched now.
     pub fn writers(&self) -> usize {
-        0
+        self.reader.matches().count(self.reader.guid())
+    }
+
+    /// Waits until at least one writer is matched.
+    ///
+    /// # Errors
+    /// There is none within `deadline` (wall time).
+    pub async fn wait_for_writer(&self, deadline: Duration) -> Result<()> {
+        let matched = self.reader.matches().wait(|_| self.writers() > 0);
+        tokio::time::timeout(deadline, matched).await.with_context(|| {
+            format!("nobody publishes {} within {:.1} s", self.topic, deadline.as_secs_f64())
+        })
     }
 
     /// The topic's absolute name.
     pub fn topic(&self) -> &str {
-        ""
+        &self.topic
     }
 }

@@ -14,14 +14,12 @@ pub enum BulkError {
         reason: String,
     },
     /// A message could not be turned into bytes, or bytes into a message.
-    #[error("topic {topic}: a message of {bytes} bytes is not what its type says: {reason}")]
+    #[error("topic {topic}: {reason}")]
     Message {
         /// ROS name of the topic.
         topic: String,
-        /// Size of the serialized message.
-        bytes: usize,
-        /// What serialization said.
-        reason: String,
+        /// What is wrong with the bytes.
+        reason: puffer_msgs::cdr::CdrError,
     },
     /// Readers did not get everything in time.
     #[error(

@@ -48,6 +48,16 @@ impl Inbox {
         self.filled.notify_one();
     }
 
+    /// Puts a sample of a writer that cannot be told to hold back; whether an older one had to go for it.
+    pub(crate) fn press_in(&self, sample: Bytes) -> bool {
+        let full = self.is_full();
+        if full {
+            self.lock().waiting.pop_front();
+        }
+        self.put(sample);
+        full
+    }
+
     /// Whether writers should hold back.
     pub(crate) fn is_full(&self) -> bool {
         self.delivery == Delivery::Every && self.lock().waiting.len() >= WAITING

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// A reader that leaves tiles unanswered for so long no longer holds the others up.
 pub(crate) const LAGS_AFTER: Duration = Duration::from_millis(150);
 /// A reader that does not answer for so long loses what there is no room for.
-pub(crate) const STUCK_AFTER: Duration = Duration::from_secs(2);
+pub(crate) const STUCK_AFTER: Duration = Duration::from_secs(1);
 /// A reader that has not been heard for so long is gone; readers speak up every second.
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(10);
 

@@ -6,19 +6,18 @@
 //! not acknowledged and clean up every 6 s only, which would break every bound on memory. What is lost is seen from
 //! the acknowledgements and sent again.
 //!
-//! [`Sender`] and [`Receiver`] are the protocol, without DDS, threads or clock; [`BulkPublisher`] and
-//! [`BulkSubscription`] run them, each in a thread of its own.
-//!
-//! [`Sender`]: sender::Sender
-//! [`Receiver`]: receiver::Receiver
+//! `sender` and `receiver` are the protocol, without DDS, threads or clock; [`BulkPublisher`] and [`BulkSubscription`]
+//! run them, each in a thread of its own. Outsiders use the named topic: `whole` writes it, `plain` reads it.
 
 mod assembly;
 mod bits;
 mod error;
+mod graph;
 mod held;
 mod host;
 mod inbox;
 mod member;
+mod plain;
 mod publisher;
 mod raw;
 mod receiver;
@@ -27,6 +26,7 @@ mod subscription;
 #[cfg(test)]
 mod tests;
 mod topic;
+mod whole;
 mod window;
 mod wire;
 
@@ -34,6 +34,5 @@ pub use error::BulkError;
 pub use host::{receive_buffer, receive_buffer_limit};
 pub use inbox::Delivery;
 pub use publisher::{BulkPublisher, PublisherStats};
-pub use raw::{from_cdr, to_cdr};
 pub use sender::Mode;
 pub use subscription::{BulkSubscription, SubscriptionStats};

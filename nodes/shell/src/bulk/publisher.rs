@@ -1,13 +1,14 @@
 //! The writer's end: a thread that runs [`Sender`].
 
 use super::error::BulkError;
-use super::raw::to_cdr;
 use super::sender::{Mode, Sender};
-use super::topic::{Endpoints, name_of};
+use super::topic::{Endpoints, name_of, start};
+use super::whole::Whole;
 use super::wire::{Tile, TileAck};
 use bytes::Bytes;
 use futures::{FutureExt, StreamExt};
-use ros2_client::{Node, Publisher, Subscription};
+use ros2_client::{MessageTypeName, Node, Publisher, Subscription};
+use rustdds::DomainParticipant;
 use serde::Serialize;
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,6 +26,7 @@ pub struct BulkPublisher {
     topic: String,
     commands: mpsc::UnboundedSender<Command>,
     stats: Arc<Mutex<PublisherStats>>,
+    whole: Option<Whole>,
 }
 
 /// Figures of a [`BulkPublisher`].
@@ -72,8 +74,24 @@ impl BulkPublisher {
             flushes: Vec::new(),
             told: (0, 0),
         };
-        ends.start("bulk_pub", move || run.run(acks, queue))?;
-        Ok(BulkPublisher { topic: topic.to_owned(), commands, stats })
+        start(topic, "bulk_pub", move || run.run(acks, queue))?;
+        Ok(BulkPublisher { topic: topic.to_owned(), commands, stats, whole: None })
+    }
+
+    /// Also publishes whole messages of type `kind` on the named topic, for readers that know nothing of tiles (RViz,
+    /// rosbag2, scripts): only while there are any, and only what `net.core.rmem_max` carries. `latched`: the newest
+    /// message stays for those that come later.
+    ///
+    /// # Errors
+    /// If DDS refuses.
+    pub fn with_whole_messages(
+        mut self,
+        participant: &DomainParticipant,
+        kind: &MessageTypeName,
+        latched: bool,
+    ) -> Result<BulkPublisher, BulkError> {
+        self.whole = Some(Whole::new(participant, &self.topic, kind, latched)?);
+        Ok(self)
     }
 
     /// Hands over a sample: a serialized message with its encapsulation header. Returns its number, from 1.
@@ -84,6 +102,9 @@ impl BulkPublisher {
     /// # Errors
     /// If the transport has ended.
     pub async fn publish(&self, bytes: Bytes) -> Result<u64, BulkError> {
+        if let Some(whole) = &self.whole {
+            whole.publish(bytes.clone());
+        }
         let deadline = Instant::now() + PUBLISH_WAIT;
         let (admitted, number) = oneshot::channel();
         self.send(Command::Publish { bytes, deadline, admitted })?;
@@ -95,12 +116,9 @@ impl BulkPublisher {
     /// # Errors
     /// As [`BulkPublisher::publish`]; also if the message has no CDR.
     pub async fn publish_message<M: Serialize>(&self, message: &M) -> Result<u64, BulkError> {
-        let bytes = to_cdr(message).map_err(|reason| BulkError::Message {
-            topic: self.topic.clone(),
-            bytes: 0,
-            reason,
-        })?;
-        self.publish(bytes).await
+        let bytes = puffer_msgs::cdr::to_bytes(message)
+            .map_err(|reason| BulkError::Message { topic: self.topic.clone(), reason })?;
+        self.publish(bytes.into()).await
     }
 
     /// Waits until every reader has the newest sample, or `within` is over.

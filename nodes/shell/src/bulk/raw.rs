@@ -1,44 +1,13 @@
-//! Messages as bytes: CDR with its encapsulation header, as bags store them.
+//! Whole messages passed through DDS unread: CDR with its encapsulation header, as bags store them.
 
 use bytes::{BufMut, Bytes, BytesMut};
 use rustdds::RepresentationIdentifier;
 use rustdds::no_key;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 /// Bytes of the encapsulation header.
 const HEADER: usize = 4;
 /// Little-endian CDR, no options.
 const LITTLE_ENDIAN: [u8; HEADER] = [0, 1, 0, 0];
-
-/// Serializes `message`, little-endian, with the encapsulation header.
-///
-/// # Errors
-/// In words, if the type has no CDR.
-pub fn to_cdr<M: Serialize>(message: &M) -> Result<Bytes, String> {
-    let mut bytes = LITTLE_ENDIAN.to_vec();
-    rustdds::serialization::to_writer_with_rep_id(
-        &mut bytes,
-        message,
-        RepresentationIdentifier::CDR_LE,
-    )
-    .map_err(|error| error.to_string())?;
-    Ok(bytes.into())
-}
-
-/// The message that `bytes`, with encapsulation header, stand for.
-///
-/// # Errors
-/// In words, if they do not fit the type.
-pub fn from_cdr<M: DeserializeOwned>(bytes: &[u8]) -> Result<M, String> {
-    let (header, body) =
-        bytes.split_at_checked(HEADER).ok_or_else(|| format!("{} bytes only", bytes.len()))?;
-    let encoding = RepresentationIdentifier::from_bytes(header)
-        .map_err(|error| format!("encapsulation header {header:?}: {error}"))?;
-    rustdds::serialization::deserialize_from_cdr_with_rep_id(body, encoding)
-        .map(|(message, _)| message)
-        .map_err(|error| error.to_string())
-}
 
 /// A message that is passed on unread.
 pub(crate) struct Raw(pub(crate) Bytes);

@@ -2,13 +2,14 @@
 
 use super::error::BulkError;
 use super::inbox::{Delivery, Inbox};
-use super::raw::from_cdr;
+use super::plain::start_plain;
 use super::receiver::Receiver;
-use super::topic::Endpoints;
+use super::topic::{Endpoints, start};
 use super::wire::{Tile, TileAck};
 use bytes::Bytes;
 use futures::{FutureExt, StreamExt};
-use ros2_client::{Node, Publisher, Subscription};
+use ros2_client::{MessageTypeName, Node, Publisher, Subscription};
+use rustdds::DomainParticipant;
 use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
 use std::pin::pin;
@@ -26,8 +27,9 @@ pub struct BulkSubscription<M> {
     topic: String,
     inbox: Arc<Inbox>,
     stats: Arc<Mutex<SubscriptionStats>>,
-    /// Ends the thread when it is dropped.
+    /// Each ends its thread when it is dropped.
     _alive: oneshot::Sender<()>,
+    _plain: Option<oneshot::Sender<()>>,
     message: PhantomData<fn() -> M>,
 }
 
@@ -65,9 +67,31 @@ impl<M> BulkSubscription<M> {
             inbox: Arc::clone(&inbox),
             stats: Arc::clone(&stats),
         };
-        ends.start("bulk_sub", move || run.run(tiles, dropped))?;
+        start(topic, "bulk_sub", move || run.run(tiles, dropped))?;
         let topic = topic.to_owned();
-        Ok(BulkSubscription { topic, inbox, stats, _alive: alive, message: PhantomData })
+        Ok(BulkSubscription {
+            topic,
+            inbox,
+            stats,
+            _alive: alive,
+            _plain: None,
+            message: PhantomData,
+        })
+    }
+
+    /// Also takes whole messages of type `kind` from the named topic, of writers that know nothing of tiles (a driver,
+    /// a bag that is played).
+    ///
+    /// # Errors
+    /// If DDS refuses.
+    pub fn with_plain_messages(
+        mut self,
+        participant: &DomainParticipant,
+        kind: &MessageTypeName,
+    ) -> Result<BulkSubscription<M>, BulkError> {
+        let inbox = Arc::clone(&self.inbox);
+        self._plain = Some(start_plain(participant, &self.topic, kind, inbox)?);
+        Ok(self)
     }
 
     /// The next sample: a serialized message with its encapsulation header.
@@ -97,11 +121,8 @@ impl<M: DeserializeOwned> BulkSubscription<M> {
     /// If the transport has ended, or the sample is no message of this type (the next call goes on after it).
     pub async fn next(&self) -> Result<M, BulkError> {
         let bytes = self.next_bytes().await?;
-        from_cdr(&bytes).map_err(|reason| BulkError::Message {
-            topic: self.topic.clone(),
-            bytes: bytes.len(),
-            reason,
-        })
+        puffer_msgs::cdr::from_bytes(&bytes)
+            .map_err(|reason| BulkError::Message { topic: self.topic.clone(), reason })
     }
 }
 

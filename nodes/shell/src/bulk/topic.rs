@@ -2,6 +2,7 @@
 
 use super::error::BulkError;
 use super::wire::{Id, Tile, TileAck};
+use puffer_msgs::Interface;
 use ros2_client::qos::{History, QosProfile};
 use ros2_client::{MessageTypeName, Name, Node, Publisher, Subscription};
 use rustdds::Topic;
@@ -23,13 +24,13 @@ impl Endpoints {
     pub(crate) fn new(node: &Node, topic: &str) -> Result<Endpoints, BulkError> {
         let make = |suffix: &str, kind: &str, kept: usize| {
             let name = Name::parse(&format!("{topic}/{suffix}")).map_err(|e| refused(topic, e))?;
-            let kind = MessageTypeName::new("puffer_msgs", kind);
+            let kind = MessageTypeName::new(Tile::PACKAGE, kind);
             node.create_topic(&name, kind, &quality(kept)).map_err(|e| refused(topic, e))
         };
         Ok(Endpoints {
             topic: topic.to_owned(),
-            tiles: make("tiles", "Tile", TILES_KEPT)?,
-            acks: make("tiles_ack", "TileAck", ACKS_KEPT)?,
+            tiles: make("tiles", Tile::NAME, TILES_KEPT)?,
+            acks: make("tiles_ack", TileAck::NAME, ACKS_KEPT)?,
         })
     }
 
@@ -48,23 +49,23 @@ impl Endpoints {
     pub(crate) fn acks_reader(&self, node: &mut Node) -> Result<Subscription<TileAck>, BulkError> {
         node.create_subscription(&self.acks, None).map_err(|e| refused(&self.topic, e))
     }
+}
 
-    /// Runs `work` in a thread of its own: a node that computes on every core does not stop its transport.
-    pub(crate) fn start<F: Future<Output = ()>>(
-        &self,
-        name: &str,
-        work: impl FnOnce() -> F + Send + 'static,
-    ) -> Result<(), BulkError> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_time()
-            .build()
-            .map_err(|e| refused(&self.topic, e))?;
-        std::thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(move || runtime.block_on(work()))
-            .map_err(|e| refused(&self.topic, e))?;
-        Ok(())
-    }
+/// Runs `work` in a thread of its own: a node that computes on every core does not stop its transport.
+pub(crate) fn start<F: Future<Output = ()>>(
+    topic: &str,
+    name: &str,
+    work: impl FnOnce() -> F + Send + 'static,
+) -> Result<(), BulkError> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .build()
+        .map_err(|e| refused(topic, e))?;
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || runtime.block_on(work()))
+        .map_err(|e| refused(topic, e))?;
+    Ok(())
 }
 
 /// Best effort: what is lost is sent again by ourselves, and DDS keeps nothing for readers that do not answer.
@@ -72,7 +73,7 @@ fn quality(kept: usize) -> QosProfile {
     QosProfile::subscription_default().history(History::KeepLast { depth: kept })
 }
 
-fn refused(topic: &str, error: impl std::fmt::Display) -> BulkError {
+pub(crate) fn refused(topic: &str, error: impl std::fmt::Display) -> BulkError {
     BulkError::Create { topic: topic.to_owned(), reason: error.to_string() }
 }
 

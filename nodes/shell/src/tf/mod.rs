@@ -1,15 +1,16 @@
 //! Transforms between frames over time.
 
+mod broadcaster;
 mod buffer;
 mod samples;
 #[cfg(test)]
 mod tests;
 mod tree;
 
-pub use buffer::TfBuffer;
-
 use crate::Stamp;
-use anyhow::{Result, bail};
+pub use broadcaster::TfBroadcaster;
+pub(crate) use broadcaster::subscribe;
+pub use buffer::TfBuffer;
 use puffer_core::geometry::Pose;
 use std::time::Duration;
 
@@ -71,6 +72,16 @@ pub enum TfError {
         /// Newest of them.
         newest: Stamp,
     },
+    /// Frames hang on each other in a circle.
+    #[error(
+        "frame `{frame}` hangs on itself, through `{parent}`; two publishers give it different parents"
+    )]
+    Loop {
+        /// Where the walk began.
+        frame: String,
+        /// The frame that was met twice.
+        parent: String,
+    },
     /// The deadline passed; the last reason stands inside.
     #[error("no transform {target_frame} <- {source_frame} within {:.1} s: {reason}", deadline.as_secs_f64())]
     Deadline {
@@ -83,26 +94,4 @@ pub enum TfError {
         /// Why not.
         reason: Box<TfError>,
     },
-}
-
-/// Publishes transforms.
-#[derive(Clone)]
-pub struct TfBroadcaster {}
-
-impl TfBroadcaster {
-    /// Publishes on `/tf`.
-    ///
-    /// # Errors
-    /// The queue stayed full.
-    pub fn send(&self, transforms: &[Transform]) -> Result<()> {
-        bail!("not yet: {}", transforms.len())
-    }
-
-    /// Publishes on `/tf_static`, together with all static transforms sent before, so that late joiners get them.
-    ///
-    /// # Errors
-    /// The queue stayed full.
-    pub fn send_static(&self, transforms: &[Transform]) -> Result<()> {
-        bail!("not yet: {}", transforms.len())
-    }
 }

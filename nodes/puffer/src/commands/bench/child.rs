@@ -15,8 +15,8 @@ use std::time::{Duration, Instant, SystemTime};
 const READERS_WITHIN: Duration = Duration::from_secs(30);
 /// How long the last samples may take.
 const FLUSH_WITHIN: Duration = Duration::from_secs(60);
-/// Samples that the publisher holds: one on its way, one ready.
-const DEPTH: usize = 2;
+/// Samples that the publisher holds: one; the next waits in `publish`.
+const DEPTH: usize = 1;
 
 /// What a child does.
 #[derive(Args)]

@@ -1,0 +1,7 @@
+//! The `cloud_filter` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    puffer_shell::main(cloud_filter::run)
+}

@@ -1,0 +1,91 @@
+//! The scans that the filter combines.
+
+use puffer_core::filter::{FilterParams, Filtered, filter};
+use puffer_core::geometry::Pose;
+use puffer_core::register::{PreparedScan, Status};
+use puffer_core::{Error, Progress};
+use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
+use puffer_shell::convert::{pose_from_message, scan_from_message, status_from_message};
+use std::collections::BTreeMap;
+
+/// Scans by their numbers.
+#[derive(Default)]
+pub(crate) struct Store {
+    scans: BTreeMap<u32, Held>,
+    /// That of the newest corrected poses, 0 before the first.
+    pub revision: u32,
+    residual: Option<f64>,
+}
+
+struct Held {
+    /// None if the scan shows nothing that could be combined.
+    scan: Option<PreparedScan>,
+    pose: Pose,
+    status: Status,
+}
+
+impl Store {
+    /// Number of scans that came.
+    pub(crate) fn len(&self) -> usize {
+        self.scans.len()
+    }
+
+    /// Takes a scan, or a newer version of one.
+    ///
+    /// # Errors
+    /// What of the message does not fit, in words.
+    pub(crate) fn take(&mut self, message: &RegisteredScan) -> Result<(), String> {
+        let scan = scan_from_message(&message.cloud)?;
+        let held = Held {
+            // One without enough points was refused already.
+            scan: PreparedScan::new(&scan).ok(),
+            pose: pose_from_message(&message.object_from_sensor.pose)?,
+            status: status_from_message(message.status)?,
+        };
+        self.scans.insert(message.id, held);
+        Ok(())
+    }
+
+    /// Takes corrected poses.
+    ///
+    /// # Errors
+    /// Lists that do not fit each other, in words.
+    pub(crate) fn correct(&mut self, message: &RegisteredPoses) -> Result<(), String> {
+        let count = message.ids.len();
+        if message.status.len() != count || message.object_from_sensor.len() != count {
+            return Err(format!(
+                "{count} ids with {} verdicts and {} poses",
+                message.status.len(),
+                message.object_from_sensor.len()
+            ));
+        }
+        for (i, id) in message.ids.iter().enumerate() {
+            if let Some(held) = self.scans.get_mut(id) {
+                held.pose = pose_from_message(&message.object_from_sensor[i].pose)?;
+                held.status = status_from_message(message.status[i])?;
+            }
+        }
+        (self.revision, self.residual) = (message.revision, Some(message.residual));
+        Ok(())
+    }
+
+    /// Combines the accepted scans.
+    ///
+    /// # Errors
+    /// As [`filter`].
+    pub(crate) fn filter(&self, params: &FilterParams) -> puffer_core::Result<Filtered> {
+        let accepted: Vec<(&PreparedScan, Pose)> = self
+            .scans
+            .values()
+            .filter(|held| held.status == Status::Accepted)
+            .filter_map(|held| Some((held.scan.as_ref()?, held.pose)))
+            .collect();
+        if accepted.is_empty() {
+            return Err(Error::input(format!(
+                "none of {} scans was accepted: there is nothing to combine",
+                self.scans.len()
+            )));
+        }
+        filter(&accepted, self.residual.unwrap_or(f64::NAN), params, &Progress::silent())
+    }
+}

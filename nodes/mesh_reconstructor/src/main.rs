@@ -1,0 +1,7 @@
+//! The `mesh_reconstructor` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    puffer_shell::main(mesh_reconstructor::run)
+}

@@ -1,0 +1,194 @@
+//! The services and the action.
+
+use crate::work::{Made, failure, make};
+use crate::{Desk, Params, paths};
+use anyhow::Result;
+use puffer_core::Progress;
+use puffer_core::mesh::io::write_mesh;
+use puffer_core::pipeline::comments;
+use puffer_msgs::action::{
+    ReconstructMesh, ReconstructMeshFeedback, ReconstructMeshGoal, ReconstructMeshResult,
+};
+use puffer_msgs::builtin_interfaces::msg::Time;
+use puffer_msgs::srv::{
+    Reconstruct, ReconstructRequest, ReconstructResponse, SaveMesh, SaveMeshRequest,
+    SaveMeshResponse,
+};
+use puffer_msgs::std_msgs::msg::Header;
+use puffer_shell::bulk::{BulkPublisher, Mode};
+use puffer_shell::convert::mesh_message;
+use puffer_shell::{Goal, Node, Outcome};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::Mutex;
+
+/// How long a goal waits for the cloud that it names.
+const CLOUD_DEADLINE: Duration = Duration::from_secs(30);
+
+/// Everything that a request needs.
+struct Counter {
+    node: Node<Params>,
+    desk: Arc<Mutex<Desk>>,
+    meshes: BulkPublisher,
+    /// One reconstruction at a time: each takes all cores.
+    turn: Mutex<()>,
+}
+
+pub(crate) fn all(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
+    let counter = Arc::new(Counter {
+        node: node.clone(),
+        desk: Arc::clone(desk),
+        meshes: node.bulk_publisher("model_mesh", Mode::Latched)?,
+        turn: Mutex::new(()),
+    });
+    let at = Arc::clone(&counter);
+    node.serve::<Reconstruct, _, _>("~/reconstruct", move |request: ReconstructRequest| {
+        let at = Arc::clone(&at);
+        async move { at.reconstruct(&request, "", &Progress::silent()).await }
+    })?;
+    let at = Arc::clone(&counter);
+    node.action_server::<ReconstructMesh, _, _, _>(
+        "~/reconstruct_action",
+        |_: &ReconstructMeshGoal| Ok(()),
+        move |goal: Goal<ReconstructMesh>| {
+            let at = Arc::clone(&at);
+            async move { at.act(goal).await }
+        },
+    )?;
+    node.serve::<SaveMesh, _, _>("~/save_mesh", move |request: SaveMeshRequest| {
+        let at = Arc::clone(&counter);
+        async move { at.save(&request).await }
+    })
+}
+
+impl Counter {
+    async fn reconstruct(
+        &self,
+        request: &ReconstructRequest,
+        cloud_hash: &str,
+        progress: &Progress,
+    ) -> ReconstructResponse {
+        let _turn = self.turn.lock().await;
+        if let Err(response) = self.wait_for_cloud(cloud_hash).await {
+            return *response;
+        }
+        let cloud = self.desk.lock().await.cloud.as_ref().map(|(cloud, _)| Arc::clone(cloud));
+        let params = self.node.params();
+        let made =
+            tokio::task::block_in_place(|| make(request, cloud.as_deref(), &params, progress));
+        let Made { mesh, response } = match made {
+            Ok(made) => made,
+            Err(response) => {
+                tracing::error!("no mesh: {}", response.message);
+                return *response;
+            }
+        };
+        let (sec, nanosec) = self.node.now().parts();
+        let frame_id = params.scan.object_frame;
+        let message = mesh_message(&mesh, Header { stamp: Time { sec, nanosec }, frame_id });
+        if let Err(error) = self.meshes.publish_message(&message).await {
+            tracing::error!("the mesh is written, but not published: {error}");
+        }
+        self.desk.lock().await.mesh = Some(Arc::new(mesh));
+        tracing::info!(
+            "{} vertices, genus {}, closed {}, {:.1} s: {}",
+            response.vertices,
+            response.genus,
+            response.closed,
+            response.seconds,
+            response.mesh_path
+        );
+        response
+    }
+
+    /// Waits for the cloud with the hash; any if it is empty.
+    async fn wait_for_cloud(
+        &self,
+        hash: &str,
+    ) -> std::result::Result<(), Box<ReconstructResponse>> {
+        let since = Instant::now();
+        loop {
+            let there = self.desk.lock().await.cloud.as_ref().is_some_and(|(_, h)| h == hash);
+            if there || hash.is_empty() {
+                return Ok(());
+            }
+            if since.elapsed() > CLOUD_DEADLINE {
+                let text = format!(
+                    "the filtered cloud {} did not come within {} s",
+                    &hash[..hash.len().min(12)],
+                    CLOUD_DEADLINE.as_secs()
+                );
+                return Err(failure(ReconstructResponse::NO_CLOUD, text));
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
+    async fn act(&self, goal: Goal<ReconstructMesh>) -> Outcome<ReconstructMeshResult> {
+        let report = goal.clone();
+        let progress = Progress::to(move |stage, fraction| {
+            let stage = stage.to_owned();
+            report.feedback(&ReconstructMeshFeedback { stage, fraction: fraction as f32 });
+        });
+        let watch = tokio::spawn({
+            let (goal, progress) = (goal.clone(), progress.clone());
+            async move {
+                goal.cancelled().await;
+                progress.cancel();
+            }
+        });
+        let asked = goal.request();
+        let request = ReconstructRequest {
+            input: asked.input.clone(),
+            output_path: asked.output_path.clone(),
+            edge_length: asked.edge_length,
+        };
+        let response = self.reconstruct(&request, &asked.cloud_hash, &progress).await;
+        watch.abort();
+        let (success, code) = (response.success, response.error_code);
+        let result = as_result(response);
+        match code {
+            _ if success => Outcome::Succeeded(result),
+            ReconstructResponse::CANCELLED => Outcome::Canceled(result),
+            _ => Outcome::Aborted(result),
+        }
+    }
+
+    async fn save(&self, request: &SaveMeshRequest) -> SaveMeshResponse {
+        let saved = self.try_to_save(request).await;
+        match saved {
+            Ok(message) => SaveMeshResponse { success: true, error_code: 0, message },
+            Err(message) => SaveMeshResponse { success: false, error_code: 1, message },
+        }
+    }
+
+    async fn try_to_save(&self, request: &SaveMeshRequest) -> std::result::Result<String, String> {
+        let params = self.node.params().mesh;
+        let path = paths::within(&params.output_folder, &request.path)?;
+        let (mesh, cloud) = {
+            let desk = self.desk.lock().await;
+            (desk.mesh.clone(), desk.cloud.clone())
+        };
+        let mesh = mesh.ok_or("there is no mesh yet: call reconstruct first")?;
+        let comments = cloud.map(|(cloud, _)| comments(&cloud, params.seed as u64));
+        write_mesh(&path, &mesh, comments.as_ref().map_or(&[], |c| &c[..]))
+            .map_err(|error| error.to_string())?;
+        Ok(path.display().to_string())
+    }
+}
+
+fn as_result(response: ReconstructResponse) -> ReconstructMeshResult {
+    ReconstructMeshResult {
+        success: response.success,
+        error_code: response.error_code,
+        error_msg: response.message,
+        mesh_path: response.mesh_path,
+        vertices: response.vertices,
+        triangles: response.triangles,
+        genus: response.genus,
+        closed: response.closed,
+        mean_sigma: response.mean_sigma,
+        unobserved_share: response.unobserved_share,
+        seconds: response.seconds,
+    }
+}

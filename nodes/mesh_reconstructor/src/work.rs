@@ -1,0 +1,115 @@
+//! From a cloud or an input file to a mesh file.
+
+use crate::{Params, paths};
+use puffer_core::geometry::Cloud;
+use puffer_core::mesh::io::{Unit, write_mesh};
+use puffer_core::mesh::{Mesh, genus, is_closed, is_oriented, is_two_manifold};
+use puffer_core::pipeline::{self, Poses, comments};
+use puffer_core::reconstruct::reconstruct;
+use puffer_core::{Error, Progress};
+use puffer_msgs::srv::{ReconstructRequest, ReconstructResponse};
+use puffer_shell::bag;
+use puffer_shell::scans::RegistrarParams;
+use std::path::Path;
+use std::time::Instant;
+
+/// The codes of `Reconstruct.srv`.
+type Codes = ReconstructResponse;
+
+/// A mesh and what is said of it.
+pub(crate) struct Made {
+    pub mesh: Mesh,
+    pub response: ReconstructResponse,
+}
+
+/// Carries a request out; `cloud` is the current filtered cloud.
+///
+/// # Errors
+/// The response that tells what was wrong.
+pub(crate) fn make(
+    request: &ReconstructRequest,
+    cloud: Option<&Cloud>,
+    params: &Params,
+    progress: &Progress,
+) -> Result<Made, Box<ReconstructResponse>> {
+    let since = Instant::now();
+    let path = paths::within(&params.mesh.output_folder, &request.output_path)
+        .map_err(|text| failure(Codes::BAD_OUTPUT, text))?;
+    let mut params = params.clone();
+    if request.edge_length > 0.0 {
+        let value = serde_json::Value::from(f64::from(request.edge_length));
+        params
+            .reconstruct
+            .set("edge_length", &value)
+            .map_err(|error| failure(Codes::BAD_INPUT, error.to_string()))?;
+    }
+    let (mesh, cloud) = if request.input.is_empty() {
+        let cloud = cloud.ok_or_else(|| {
+            failure(
+                Codes::NO_CLOUD,
+                "no filtered cloud came yet: call cloud_filter's filter".into(),
+            )
+        })?;
+        let mesh = reconstruct(cloud, &params.reconstruct, progress).map_err(of_error)?;
+        (mesh, cloud.clone())
+    } else {
+        from_file(Path::new(&request.input), &params, progress).map_err(of_error)?
+    };
+    write_mesh(&path, &mesh, &comments(&cloud, params.mesh.seed as u64)).map_err(of_error)?;
+    let mut response = described(&mesh);
+    response.mesh_path = path.display().to_string();
+    response.seconds = since.elapsed().as_secs_f32();
+    Ok(Made { mesh, response })
+}
+
+fn from_file(
+    input: &Path,
+    params: &Params,
+    progress: &Progress,
+) -> puffer_core::Result<(Mesh, Cloud)> {
+    let of_registrar =
+        RegistrarParams { scan: params.scan.clone(), register: params.register.clone() };
+    let input = if bag::is_bag(input) {
+        pipeline::Input::Scans(bag::scans(input, &of_registrar, progress)?)
+    } else {
+        pipeline::Input::open(input, Unit::M)?
+    };
+    let stages = pipeline::Params {
+        register: params.register.clone(),
+        filter: params.filter.clone(),
+        reconstruct: params.reconstruct.clone(),
+    };
+    let outcome = pipeline::run(&input, Poses::Robot, &stages, progress)?;
+    Ok((outcome.mesh, outcome.cloud))
+}
+
+/// What a response says of a mesh.
+fn described(mesh: &Mesh) -> ReconstructResponse {
+    let measured: Vec<f64> = mesh.sigma.iter().copied().filter(|s| s.is_finite()).collect();
+    let unobserved = mesh.observed.iter().filter(|o| !**o).count();
+    ReconstructResponse {
+        success: true,
+        vertices: mesh.vertices.len() as u32,
+        triangles: mesh.triangles.len() as u32,
+        genus: genus(mesh).and_then(|g| i32::try_from(g).ok()).unwrap_or(-1),
+        closed: is_closed(mesh) && is_two_manifold(mesh) && is_oriented(mesh),
+        mean_sigma: (measured.iter().sum::<f64>() / measured.len().max(1) as f64) as f32,
+        unobserved_share: unobserved as f32 / mesh.vertices.len().max(1) as f32,
+        ..ReconstructResponse::default()
+    }
+}
+
+pub(crate) fn failure(error_code: u16, message: String) -> Box<ReconstructResponse> {
+    Box::new(ReconstructResponse { error_code, message, ..ReconstructResponse::default() })
+}
+
+fn of_error(error: Error) -> Box<ReconstructResponse> {
+    let code = match &error {
+        Error::Cancelled => Codes::CANCELLED,
+        Error::Io { action: "write" | "create", .. } => Codes::BAD_OUTPUT,
+        Error::Io { .. } | Error::Format { .. } | Error::Input(_) | Error::Parameter { .. } => {
+            Codes::BAD_INPUT
+        }
+    };
+    failure(code, error.to_string())
+}

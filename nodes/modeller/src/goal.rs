@@ -1,0 +1,177 @@
+//! The action `model_object`.
+
+use crate::Params;
+use crate::inbox::Inbox;
+use crate::journal::Journal;
+use crate::partners::Partners;
+use crate::runner::{End, Runner, phase_constant};
+use anyhow::Result;
+use puffer_core::session::{Event, Outcome as Ended, Phase, SessionParams, State};
+use puffer_msgs::action::{ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult};
+use puffer_msgs::builtin_interfaces::msg::{Duration as DurationMessage, Time};
+use puffer_msgs::msg::ModellingStatus;
+use puffer_msgs::std_msgs::msg::Header;
+use puffer_shell::{Goal, Node, Outcome, Publisher};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+
+/// The modeller, ready for goals.
+pub(crate) struct Modeller {
+    pub node: Node<Params>,
+    pub partners: Partners,
+    pub inbox: Arc<Inbox>,
+    pub status: Publisher<ModellingStatus>,
+    /// Where the running session takes its controls.
+    pub controls: Mutex<Option<UnboundedSender<Event>>>,
+}
+
+impl Modeller {
+    /// Sends a control to the running session; false if there is none.
+    pub(crate) fn control(&self, event: Event) -> bool {
+        let controls = self.controls.lock().unwrap_or_else(PoisonError::into_inner);
+        controls.as_ref().is_some_and(|sender| sender.send(event).is_ok())
+    }
+
+    /// Whether a session is running.
+    pub(crate) fn is_busy(&self) -> bool {
+        let controls = self.controls.lock().unwrap_or_else(PoisonError::into_inner);
+        controls.as_ref().is_some_and(|sender| !sender.is_closed())
+    }
+
+    pub(crate) async fn model(&self, goal: Goal<ModelObject>) -> Outcome<ModelObjectResult> {
+        let (sender, controls) = unbounded_channel();
+        *self.controls.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender.clone());
+        let watch = tokio::spawn({
+            let goal = goal.clone();
+            async move {
+                goal.cancelled().await;
+                // A session that has ended needs no cancelling.
+                let _ = sender.send(Event::Cancel);
+            }
+        });
+        let since = Instant::now();
+        let told = |state: &State, message: &str| self.tell(&goal, state, message, since);
+        let outcome = match self.run(&goal, controls, told).await {
+            Ok((end, result)) => finished(end, result),
+            Err(error) => failed(ModelObjectResult::NO_DRIVER, format!("{error:#}")),
+        };
+        watch.abort();
+        *self.controls.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        outcome
+    }
+
+    async fn run(
+        &self,
+        goal: &Goal<ModelObject>,
+        controls: tokio::sync::mpsc::UnboundedReceiver<Event>,
+        told: impl FnMut(&State, &str),
+    ) -> Result<(End, ModelObjectResult)> {
+        let since = Instant::now();
+        let params = self.node.params();
+        let ready = async {
+            self.partners.ready().await?;
+            self.partners.reset().await
+        };
+        // Whoever asks to end while partners are awaited is heard at once.
+        tokio::select! {
+            ready = ready => ready?,
+            () = goal.cancelled() => {}
+        }
+        self.inbox.clear();
+        let journal = Journal::begin(&params, self.node.now())?;
+        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal);
+        let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
+        let end = runner.run(session(&params, goal.request()), first, controls, told).await;
+        runner.report(&end)?;
+        let mesh = &runner.mesh;
+        let result = ModelObjectResult {
+            success: mesh.success,
+            mesh_path: mesh.mesh_path.clone(),
+            vertices: mesh.vertices,
+            triangles: mesh.triangles,
+            genus: mesh.genus,
+            closed: mesh.closed,
+            mean_sigma: mesh.mean_sigma,
+            unobserved_share: mesh.unobserved_share,
+            seconds: since.elapsed().as_secs_f32(),
+            run_folder: runner.journal.folder(),
+            scans: end.state.scans as u32,
+            coverage: end.state.coverage as f32,
+            ..ModelObjectResult::default()
+        };
+        Ok((end, result))
+    }
+
+    fn tell(&self, goal: &Goal<ModelObject>, state: &State, message: &str, since: Instant) {
+        let feedback = ModelObjectFeedback {
+            phase: phase_constant(state.phase),
+            scans: state.scans as u32,
+            coverage: state.coverage as f32,
+            expected_gain: state.expected_gain as f32,
+            elapsed: DurationMessage::from_seconds(since.elapsed().as_secs_f64()),
+            message: message.to_owned(),
+        };
+        let (sec, nanosec) = self.node.now().parts();
+        let status = ModellingStatus {
+            header: Header { stamp: Time { sec, nanosec }, frame_id: String::new() },
+            phase: feedback.phase,
+            scans: feedback.scans,
+            coverage: feedback.coverage,
+            expected_gain: feedback.expected_gain,
+            elapsed: feedback.elapsed,
+            message: feedback.message.clone(),
+        };
+        goal.feedback(&feedback);
+        if let Err(error) = self.status.publish(&status) {
+            tracing::warn!("modelling_status: {error:#}");
+        }
+    }
+}
+
+/// The session that a goal asks for.
+fn session(params: &Params, goal: &ModelObjectGoal) -> SessionParams {
+    let mut session = params.session.clone();
+    if goal.max_scans > 0 {
+        session.max_scans = goal.max_scans as usize;
+    }
+    if goal.coverage > 0.0 {
+        session.coverage = f64::from(goal.coverage).min(1.0);
+    }
+    session
+}
+
+fn finished(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResult> {
+    match end.outcome {
+        Ended::Modelled(reason) => {
+            tracing::info!("modelled with {} scans: {reason}", end.state.scans);
+            Outcome::Succeeded(result)
+        }
+        Ended::Cancelled => {
+            result.error_code = ModelObjectResult::CANCELLED;
+            result.error_msg = "cancelled".to_owned();
+            Outcome::Canceled(result)
+        }
+        Ended::Failed(phase, why) => {
+            tracing::error!("{why}");
+            result.error_code = code_of(phase);
+            result.error_msg = why;
+            Outcome::Aborted(result)
+        }
+    }
+}
+
+fn code_of(phase: Phase) -> u16 {
+    match phase {
+        Phase::Preparing | Phase::Paused | Phase::Done => ModelObjectResult::NO_DRIVER,
+        Phase::Planning | Phase::Moving => ModelObjectResult::MOTION,
+        Phase::Scanning => ModelObjectResult::NO_SCAN,
+        Phase::Registering | Phase::Refining => ModelObjectResult::REGISTRATION,
+        Phase::Filtering | Phase::Reconstructing => ModelObjectResult::RECONSTRUCTION,
+    }
+}
+
+fn failed(error_code: u16, error_msg: String) -> Outcome<ModelObjectResult> {
+    tracing::error!("{error_msg}");
+    Outcome::Aborted(ModelObjectResult { error_code, error_msg, ..ModelObjectResult::default() })
+}

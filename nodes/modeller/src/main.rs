@@ -1,0 +1,7 @@
+//! The `modeller` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    puffer_shell::main(modeller::run)
+}

@@ -1,0 +1,47 @@
+//! `puffer node`: this program as one of the nodes.
+
+use crate::failure::usage;
+use crate::nodes::{NODES, find};
+use anyhow::Result;
+use clap::Args;
+use puffer_shell::{RosArgs, Stop};
+use std::process::ExitCode;
+use tokio::io::AsyncReadExt;
+
+/// Runs one node, as its own program does.
+#[derive(Args)]
+pub struct Node {
+    /// End when standard input is closed
+    #[arg(long, hide = true)]
+    with_parent: bool,
+    /// mock_driver, scan_registrar, nbv_planner, cloud_filter, mesh_reconstructor or modeller
+    #[arg(value_name = "NAME")]
+    name: String,
+    /// --ros-args and what follows, as every ROS 2 node takes them
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGS")]
+    args: Vec<String>,
+}
+
+impl Node {
+    pub(super) fn run(&self) -> Result<ExitCode> {
+        let Some(node) = find(&self.name) else {
+            let names: Vec<&str> = NODES.iter().map(|kind| kind.name).collect();
+            return Err(usage(format!("there is no node {}; there are {}", self.name, names.join(", "))));
+        };
+        let run = async |args: RosArgs, stop: Stop| {
+            if self.with_parent {
+                tokio::spawn(end_with_input(stop.clone()));
+            }
+            (node.run)(args, stop).await
+        };
+        Ok(puffer_shell::main_with(self.args.iter().cloned(), run))
+    }
+}
+
+/// Stops the node when standard input comes to its end: whoever started it is gone.
+async fn end_with_input(stop: Stop) {
+    let mut input = tokio::io::stdin();
+    let mut bytes = [0; 64];
+    while matches!(input.read(&mut bytes).await, Ok(1..)) {}
+    stop.stop();
+}

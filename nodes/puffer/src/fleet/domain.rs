@@ -1,0 +1,50 @@
+//! A DDS domain that nobody uses.
+
+use anyhow::{Result, bail};
+use std::net::UdpSocket;
+
+/// Domains that are tried; low ones are people's own.
+const DOMAINS: std::ops::RangeInclusive<u16> = 101..=230;
+/// Participants of a domain whose ports must be free.
+const PARTICIPANTS: u16 = 12;
+
+/// Ports of a domain (RTPS 2.5, 9.6.2.3): discovery and data by multicast, and by unicast for each participant.
+fn ports(domain: u16) -> impl Iterator<Item = u16> {
+    let base = 7400 + 250 * domain;
+    let of_participant = (0..PARTICIPANTS).flat_map(move |p| [base + 10 + 2 * p, base + 11 + 2 * p]);
+    [base, base + 1].into_iter().chain(of_participant)
+}
+
+/// Whether no socket on this machine is bound to a port of the domain.
+pub(crate) fn is_free(domain: u16) -> bool {
+    ports(domain).all(|port| UdpSocket::bind(("0.0.0.0", port)).is_ok())
+}
+
+/// A free domain. Which one is tried first depends on the process, so that two runs that begin at once do not meet.
+///
+/// # Errors
+/// All are in use.
+pub(crate) fn free() -> Result<u16> {
+    let count = DOMAINS.end() - DOMAINS.start() + 1;
+    let first = (std::process::id() % u32::from(count)) as u16;
+    let tried = (0..count).map(|i| DOMAINS.start() + (first + 7 * i) % count);
+    match tried.into_iter().find(|domain| is_free(*domain)) {
+        Some(domain) => Ok(domain),
+        None => bail!("no DDS domain from {} to {} is free", DOMAINS.start(), DOMAINS.end()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_domain_in_use_is_not_free() {
+        let domain = free().unwrap();
+        let socket = UdpSocket::bind(("0.0.0.0", 7400 + 250 * domain + 11)).unwrap();
+        assert!(!is_free(domain));
+        drop(socket);
+        assert!(is_free(domain));
+        assert!(ports(230).all(|port| port > 0) && 7400 + 250 * 230 < u16::MAX as u32 as i32);
+    }
+}

@@ -1,0 +1,104 @@
+//! Nodes as processes: this program again, as `puffer node NAME`.
+
+use super::Crew;
+use anyhow::{Context, Result};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use std::fs::{File, OpenOptions};
+use std::path::PathBuf;
+use std::process::Stdio;
+use std::time::Duration;
+use tokio::process::{Child, Command};
+
+/// How long a node may take to end when it is asked to.
+const GRACE: Duration = Duration::from_secs(20);
+/// How often nodes are looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+/// Lines of a lost node that are told.
+const LAST_LINES: usize = 3;
+
+/// The processes.
+pub(crate) struct Processes {
+    children: Vec<(&'static str, Child)>,
+    log: PathBuf,
+}
+
+impl Processes {
+    pub(super) fn start(crew: &Crew) -> Result<Processes> {
+        let program = std::env::current_exe().context("cannot find this program's own file")?;
+        let log = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&crew.log)
+            .with_context(|| format!("cannot write {}", crew.log.display()))?;
+        let mut processes = Processes { children: Vec::new(), log: crew.log.clone() };
+        for node in &crew.nodes {
+            let lines = |file: &File| file.try_clone().map(Stdio::from);
+            let child = Command::new(&program)
+                .args(["node", "--with-parent", node.name, "--ros-args", "--params-file"])
+                .arg(&crew.params)
+                .env("ROS_DOMAIN_ID", crew.domain.to_string())
+                // The terminal's Ctrl-C is for this process, which ends them in order. They end, too, when the other
+                // end of their standard input is gone with this process.
+                .process_group(0)
+                .stdin(Stdio::piped())
+                .stdout(lines(&log)?)
+                .stderr(lines(&log)?)
+                .kill_on_drop(true)
+                .spawn()
+                .with_context(|| format!("cannot start {}", node.name))?;
+            processes.children.push((node.name, child));
+        }
+        Ok(processes)
+    }
+
+    pub(super) fn roll(&self) -> Vec<(String, u32)> {
+        let entry = |(name, child): &(&'static str, Child)| {
+            ((*name).to_owned(), child.id().unwrap_or_default())
+        };
+        self.children.iter().map(entry).collect()
+    }
+
+    pub(super) async fn loss(&mut self) -> String {
+        loop {
+            for (name, child) in &mut self.children {
+                if let Ok(Some(status)) = child.try_wait() {
+                    return format!("{name} has ended ({status}): {}", self.last_words(name));
+                }
+            }
+            tokio::time::sleep(LOOK_EVERY).await;
+        }
+    }
+
+    /// The last lines of the log that name the node, or that are errors.
+    fn last_words(&self, name: &str) -> String {
+        let text = std::fs::read_to_string(&self.log).unwrap_or_default();
+        let tells = |line: &&str| line.contains(name) || line.starts_with("error:");
+        let lines: Vec<&str> = text.lines().filter(tells).collect();
+        lines[lines.len().saturating_sub(LAST_LINES)..].join(" / ")
+    }
+
+    pub(super) async fn stop(mut self) -> Vec<String> {
+        for (_, child) in &self.children {
+            if let Some(id) = child.id().and_then(|id| i32::try_from(id).ok()) {
+                // One that has ended already needs no signal.
+                let _ = kill(Pid::from_raw(id), Signal::SIGTERM);
+            }
+        }
+        let mut problems = Vec::new();
+        for (name, child) in &mut self.children {
+            match tokio::time::timeout(GRACE, child.wait()).await {
+                Ok(Ok(status)) if matches!(status.code(), Some(0 | 130)) => {}
+                Ok(Ok(status)) => problems.push(format!("{name} ended with {status}")),
+                Ok(Err(error)) => problems.push(format!("{name}: {error}")),
+                Err(_) => {
+                    problems.push(format!("{name} did not end within {GRACE:?} and was killed"));
+                    if let Err(error) = child.kill().await {
+                        problems.push(format!("{name}: {error}"));
+                    }
+                }
+            }
+        }
+        problems
+    }
+}

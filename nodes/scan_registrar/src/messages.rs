@@ -1,0 +1,60 @@
+//! What the registrar says of its scans.
+
+use puffer_core::geometry::Mat6;
+use puffer_core::register::Registration;
+use puffer_msgs::builtin_interfaces::msg::Time;
+use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
+use puffer_msgs::std_msgs::msg::Header;
+use puffer_shell::Stamp;
+use puffer_shell::convert::{pose_message, pose_with_covariance, scan_message, status_message};
+use puffer_shell::scans::{Intake, Registered};
+
+fn header(stamp: Stamp, frame: &str) -> Header {
+    let (sec, nanosec) = stamp.parts();
+    Header { stamp: Time { sec, nanosec }, frame_id: frame.to_owned() }
+}
+
+/// A scan, seen by a sensor with the frame `sensor`.
+pub(crate) fn scan(id: usize, scan: &Registered, object: &str, sensor: &str) -> RegisteredScan {
+    let verdict = scan.verdict;
+    let covariance = verdict.map_or_else(Mat6::zeros, |v| v.covariance);
+    let free = verdict.map_or(&[][..], |v| &v.free_directions);
+    RegisteredScan {
+        header: header(scan.stamp, object),
+        id: id as u32,
+        cloud: scan_message(scan.scan, header(scan.stamp, sensor)),
+        object_from_sensor: pose_with_covariance(&scan.pose, &covariance),
+        prior: pose_message(&scan.prior),
+        status: status_message(scan.status()),
+        reason: scan.reason.to_owned(),
+        fitness: verdict.map_or(0.0, |v| v.fitness),
+        overlap: verdict.map_or(0.0, |v| v.overlap),
+        rmse: verdict.map_or(f64::NAN, |v| v.rmse),
+        correspondences: verdict.map_or(0, |v| v.correspondences as u32),
+        free_directions: free.iter().flat_map(|twist| twist.iter().copied()).collect(),
+    }
+}
+
+/// The poses of all usable scans after a refinement.
+pub(crate) fn poses(
+    intake: &Intake,
+    registration: &Registration,
+    revision: u32,
+    stamp: Stamp,
+    object: &str,
+) -> RegisteredPoses {
+    let verdicts = &registration.verdicts;
+    RegisteredPoses {
+        header: header(stamp, object),
+        revision,
+        ids: intake.usable().iter().map(|&id| id as u32).collect(),
+        status: verdicts.iter().map(|v| status_message(v.status)).collect(),
+        object_from_sensor: registration
+            .poses
+            .iter()
+            .zip(verdicts)
+            .map(|(pose, verdict)| pose_with_covariance(pose, &verdict.covariance))
+            .collect(),
+        residual: registration.residual,
+    }
+}

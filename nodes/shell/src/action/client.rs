@@ -1,0 +1,223 @@
+//! The asking end of an action.
+
+use super::{GoalId, Outcome, Place, feedback_topic};
+use crate::dds::Reader;
+use crate::{CallError, Client, Stop, qos};
+use anyhow::Result;
+use puffer_msgs::action_msgs::msg::{GoalInfo, GoalStatus};
+use puffer_msgs::action_msgs::srv::{CancelGoal, CancelGoalRequest};
+use puffer_msgs::unique_identifier_msgs::msg::UUID;
+use puffer_msgs::{Action, FeedbackMessage, GetResultRequest, GetResultResponse, SendGoalRequest};
+use rustdds::policy::Durability;
+use std::collections::BTreeMap;
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::sync::watch;
+
+/// Feedback is read into memory at once; this many wait in DDS meanwhile.
+const FEEDBACK_DEPTH: i32 = 100;
+/// The end of a goal is asked for once and may take this long.
+const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
+
+type Listeners<F> = Mutex<BTreeMap<GoalId, UnboundedSender<F>>>;
+type End<R> = Option<Result<GetResultResponse<R>, CallError>>;
+
+/// Sends goals to an action server; clones share it.
+pub struct ActionClient<A: Action> {
+    inner: Arc<Inner<A>>,
+}
+
+impl<A: Action> Clone for ActionClient<A> {
+    fn clone(&self) -> Self {
+        Self { inner: Arc::clone(&self.inner) }
+    }
+}
+
+struct Inner<A: Action> {
+    name: String,
+    send_goal: Client<A::SendGoal>,
+    cancel_goal: Client<CancelGoal>,
+    get_result: Client<A::GetResult>,
+    listeners: Arc<Listeners<A::Feedback>>,
+    /// Ends the task that reads feedback.
+    dropped: Stop,
+    stop: Stop,
+}
+
+impl<A: Action> Drop for Inner<A> {
+    fn drop(&mut self) {
+        self.dropped.stop();
+    }
+}
+
+impl<A: Action> ActionClient<A> {
+    pub(crate) fn new(place: Place<'_>) -> Result<Self> {
+        let (topic, kind) = feedback_topic::<A>(&place);
+        let quality = qos::build(true, Durability::Volatile, FEEDBACK_DEPTH);
+        let feedback = place.dds.reader(&topic, &kind, &quality)?;
+        let (dds, mapping, domain, stop) = (place.dds, place.mapping, place.domain, place.stop);
+        let part = |name: &str| place.part(name);
+        let inner = Arc::new(Inner {
+            name: place.name.to_owned(),
+            send_goal: Client::new(dds, mapping, domain, &part("send_goal"), stop)?,
+            cancel_goal: Client::new(dds, mapping, domain, &part("cancel_goal"), stop)?,
+            get_result: Client::new(dds, mapping, domain, &part("get_result"), stop)?,
+            listeners: Arc::default(),
+            dropped: stop.child(),
+            stop: stop.clone(),
+        });
+        let listeners = Arc::clone(&inner.listeners);
+        tokio::spawn(hear::<A>(feedback, listeners, inner.name.clone(), inner.dropped.clone()));
+        Ok(Self { inner })
+    }
+
+    /// Sends a goal; `None` if the server rejects it.
+    ///
+    /// # Errors
+    /// No server or no answer within `deadline` (wall time), or the node stops.
+    pub async fn send(
+        &self,
+        goal: &A::Goal,
+        deadline: Duration,
+    ) -> Result<Option<GoalHandle<A>>, CallError> {
+        let inner = &self.inner;
+        let id = new_id();
+        let (listener, feedback) = unbounded_channel();
+        inner.listeners.lock().unwrap_or_else(PoisonError::into_inner).insert(id, listener);
+        let (end, ended) = watch::channel(None);
+        let handle =
+            GoalHandle { inner: Arc::clone(inner), id, feedback, ended, dropped: Stop::new() };
+        let request = SendGoalRequest { goal_id: UUID { uuid: id }, goal: goal.clone() };
+        if !inner.send_goal.call(&request, deadline).await?.accepted {
+            return Ok(None);
+        }
+        let (get_result, dropped) = (inner.get_result.clone(), handle.dropped.clone());
+        tokio::spawn(async move {
+            let request = GetResultRequest { goal_id: UUID { uuid: id } };
+            if let Some(answer) = dropped.or(get_result.call(&request, FOR_EVER)).await {
+                end.send_replace(Some(answer));
+            }
+        });
+        Ok(Some(handle))
+    }
+
+    /// Whether a server is matched now.
+    pub fn is_ready(&self) -> bool {
+        let inner = &self.inner;
+        inner.send_goal.is_ready() && inner.cancel_goal.is_ready() && inner.get_result.is_ready()
+    }
+
+    /// Absolute name of the action.
+    pub fn name(&self) -> &str {
+        &self.inner.name
+    }
+}
+
+/// An accepted goal, as its client sees it. Dropping it does not cancel the goal.
+pub struct GoalHandle<A: Action> {
+    inner: Arc<Inner<A>>,
+    id: GoalId,
+    feedback: UnboundedReceiver<A::Feedback>,
+    ended: watch::Receiver<End<A::Result>>,
+    /// Ends the task that waits for the result.
+    dropped: Stop,
+}
+
+impl<A: Action> Drop for GoalHandle<A> {
+    fn drop(&mut self) {
+        self.dropped.stop();
+        self.inner.listeners.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.id);
+    }
+}
+
+impl<A: Action> GoalHandle<A> {
+    /// The next feedback for this goal; `None` once the goal has ended, its server has died or the node stops.
+    pub async fn feedback(&mut self) -> Option<A::Feedback> {
+        tokio::select! {
+            biased;
+            feedback = self.feedback.recv() => feedback,
+            _ = self.ended.wait_for(Option::is_some) => None,
+            () = self.inner.stop.stopped() => None,
+        }
+    }
+
+    /// Waits for the goal's end; may be called again.
+    ///
+    /// # Errors
+    /// No end within `deadline` (wall time), the server has died, or the node stops.
+    pub async fn result(&self, deadline: Duration) -> Result<Outcome<A::Result>, CallError> {
+        let service = || self.inner.get_result.name().to_owned();
+        let mut ended = self.ended.clone();
+        let end = tokio::time::timeout(deadline, ended.wait_for(Option::is_some)).await;
+        let end = match end {
+            Ok(Ok(end)) => end.clone(),
+            Ok(Err(_)) => None,
+            Err(_) => {
+                return Err(CallError::NoResult { action: self.inner.name.clone(), deadline });
+            }
+        };
+        let answer = end.unwrap_or_else(|| Err(CallError::Stopped { service: service() }))?;
+        match answer.status {
+            GoalStatus::STATUS_SUCCEEDED => Ok(Outcome::Succeeded(answer.result)),
+            GoalStatus::STATUS_ABORTED => Ok(Outcome::Aborted(answer.result)),
+            GoalStatus::STATUS_CANCELED => Ok(Outcome::Canceled(answer.result)),
+            status => Err(CallError::Transport {
+                service: service(),
+                message: format!(
+                    "the server does not know the goal (status {status}); did it restart?"
+                ),
+            }),
+        }
+    }
+
+    /// Asks the server to give up; `false` if the goal had ended already or the server refuses. The goal's end comes
+    /// by [`GoalHandle::result`].
+    ///
+    /// # Errors
+    /// No answer within `deadline`, or the node stops.
+    pub async fn cancel(&self, deadline: Duration) -> Result<bool, CallError> {
+        let goal_id = UUID { uuid: self.id };
+        let goal_info = GoalInfo { goal_id, ..Default::default() };
+        let answer =
+            self.inner.cancel_goal.call(&CancelGoalRequest { goal_info }, deadline).await?;
+        Ok(answer.goals_canceling.iter().any(|goal| goal.goal_id == goal_id))
+    }
+}
+
+/// Hands feedback to the goals that it is for.
+async fn hear<A: Action>(
+    reader: Reader,
+    listeners: Arc<Listeners<A::Feedback>>,
+    name: String,
+    stop: Stop,
+) {
+    while let Some(sample) = stop.or(reader.next()).await {
+        let message = sample.and_then(|s| s.raw.decode::<FeedbackMessage<A::Feedback>>());
+        match message {
+            Ok(message) => {
+                let listeners = listeners.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Some(listener) = listeners.get(&message.goal_id.uuid) {
+                    // A goal that has just been dropped does not listen any more.
+                    let _ = listener.send(message.feedback);
+                }
+            }
+            Err(error) => tracing::warn!("{name}: feedback ignored: {error}"),
+        }
+    }
+}
+
+/// 128 bits that nobody else has: the standard library seeds its hashers from the system's randomness.
+fn new_id() -> GoalId {
+    let word = |salt| {
+        let mut hasher = RandomState::new().build_hasher();
+        hasher.write_u64(salt);
+        hasher.write_i64(crate::Stamp::wall().nanos());
+        hasher.finish().to_le_bytes()
+    };
+    let mut id = [0; 16];
+    id[..8].copy_from_slice(&word(1));
+    id[8..].copy_from_slice(&word(2));
+    id
+}

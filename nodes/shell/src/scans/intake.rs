@@ -1,0 +1,155 @@
+//! All scans that came, registered.
+
+use super::{Observation, RegistrarParams};
+use crate::Stamp;
+use puffer_core::geometry::{Pose, Scan};
+use puffer_core::register::{PreparedScan, Registrar, Registration, Status, Verdict};
+use puffer_core::scans::View;
+use puffer_core::{Progress, Result};
+
+/// Registers observations in the order in which they come.
+pub struct Intake {
+    params: RegistrarParams,
+    registrar: Registrar,
+    entries: Vec<Entry>,
+}
+
+/// One scan.
+struct Entry {
+    observation: Observation,
+    /// What counts as the object, at the pose known last.
+    scan: Scan,
+    /// Its number in the registrar, or why it has none.
+    place: std::result::Result<usize, String>,
+}
+
+/// A scan as it stands.
+pub struct Registered<'a> {
+    /// When it was taken.
+    pub stamp: Stamp,
+    /// What counts as the object, sensor frame.
+    pub scan: &'a Scan,
+    /// What the robot said.
+    pub prior: Pose,
+    /// Estimated `object_from_sensor`.
+    pub pose: Pose,
+    /// What became of it; none if it shows too little to be registered.
+    pub verdict: Option<&'a Verdict>,
+    /// Why there is no verdict.
+    pub reason: &'a str,
+}
+
+impl Registered<'_> {
+    /// Whether it joins the model.
+    pub fn status(&self) -> Status {
+        self.verdict.map_or(Status::Refused, |verdict| verdict.status)
+    }
+}
+
+impl Intake {
+    /// Without scans.
+    pub fn new(params: RegistrarParams) -> Intake {
+        let registrar = Registrar::new(params.scan.pose_sigma(), params.register.clone());
+        Intake { params, registrar, entries: Vec::new() }
+    }
+
+    /// Number of scans.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Takes a scan; the numbers of those whose pose or verdict is new, this one first.
+    pub fn add(&mut self, observation: Observation) -> Vec<usize> {
+        let id = self.entries.len();
+        let scan = observation.before_registration(&self.params.scan);
+        let prepared = PreparedScan::new(&scan);
+        let place = match &prepared {
+            Ok(prepared) if prepared.points.len() >= LEAST_POINTS => Ok(self.registrar.len()),
+            Ok(prepared) => Err(format!(
+                "only {} points of a surface may be the object's, {LEAST_POINTS} are needed",
+                prepared.points.len()
+            )),
+            Err(error) => Err(error.to_string()),
+        };
+        let good = place.is_ok();
+        self.entries.push(Entry { observation, scan, place });
+        let (Ok(prepared), true) = (prepared, good) else { return vec![id] };
+        let changed = self.registrar.add(&prepared, &self.entries[id].observation.prior);
+        let ids: Vec<usize> = changed.into_iter().filter_map(|place| self.id_of(place)).collect();
+        for &id in &ids {
+            self.cut_again(id);
+        }
+        ids
+    }
+
+    /// Counts a scan that cannot be used, and why; its number.
+    pub fn add_unusable(&mut self, stamp: Stamp, reason: String) -> usize {
+        let observation = Observation::nothing(stamp);
+        self.entries.push(Entry { observation, scan: Scan::default(), place: Err(reason) });
+        self.entries.len() - 1
+    }
+
+    /// Once a pose is known, less has to be cut for caution.
+    fn cut_again(&mut self, id: usize) {
+        let entry = &mut self.entries[id];
+        let Ok(place) = entry.place else { return };
+        if self.registrar.verdict(place).status != Status::Accepted {
+            return;
+        }
+        let scan = entry.observation.at(&self.registrar.pose(place), &self.params.scan);
+        if let Ok(prepared) = PreparedScan::new(&scan) {
+            self.registrar.replace(place, &prepared);
+            entry.scan = scan;
+        }
+    }
+
+    fn id_of(&self, place: usize) -> Option<usize> {
+        self.entries.iter().position(|entry| entry.place == Ok(place))
+    }
+
+    /// Scan `id` as it stands.
+    pub fn scan(&self, id: usize) -> Registered<'_> {
+        let entry = &self.entries[id];
+        let observation = &entry.observation;
+        let (pose, verdict, reason) = match &entry.place {
+            Ok(place) => {
+                let verdict = self.registrar.verdict(*place);
+                (self.registrar.pose(*place), Some(verdict), verdict.reason.as_str())
+            }
+            Err(reason) => (observation.prior, None, reason.as_str()),
+        };
+        let (stamp, prior) = (observation.stamp, observation.prior);
+        Registered { stamp, scan: &entry.scan, prior, pose, verdict, reason }
+    }
+
+    /// The numbers of the scans that can be registered, in the order of [`Intake::refine`]'s lists.
+    pub fn usable(&self) -> Vec<usize> {
+        (0..self.entries.len()).filter(|&id| self.entries[id].place.is_ok()).collect()
+    }
+
+    /// The usable scans with the robot's poses, as a scan folder holds them.
+    pub fn views(&self) -> Vec<View> {
+        let view = |id: usize| View {
+            name: format!("view_{id:03}"),
+            scan: self.entries[id].scan.clone(),
+            object_from_sensor: self.entries[id].observation.prior,
+        };
+        self.usable().into_iter().map(view).collect()
+    }
+
+    /// Optimises the poses of all usable scans together.
+    ///
+    /// # Errors
+    /// As [`puffer_core::register::register`].
+    pub fn refine(&mut self, progress: &Progress) -> Result<Registration> {
+        self.registrar.refine(progress)
+    }
+}
+
+/// Oriented points without which a scan shows no surface worth registering.
+const LEAST_POINTS: usize = 100;
