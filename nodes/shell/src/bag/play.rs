@@ -28,7 +28,7 @@ pub struct Player {
 }
 
 enum Outlet {
-    Plain(Writer),
+    Plain(Box<Writer>),
     Bulk(BulkPublisher),
 }
 
@@ -46,7 +46,7 @@ impl Player {
                     let name = format!("rt{}", node.resolve(&entry.topic)?);
                     let writer =
                         node.dds().writer(&name, &entry.dds_type()?, &policies(profile))?;
-                    Outlet::Plain(writer)
+                    Outlet::Plain(Box::new(writer))
                 }
                 Route::Bulk { latched } => {
                     let mode =
