@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{SOON, free_domain, node};
+use common::{SOON, eventually, free_domain, node};
 use puffer_msgs::rosgraph_msgs::msg::Clock;
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
 use puffer_msgs::{Interface, cdr};
-use puffer_shell::bag::{BagMessage, BagReader, BagWriter, Player, TopicRoute, record};
+use puffer_shell::bag::{BagMessage, BagReader, BagWriter, Player, Recording, TopicRoute, record};
 use puffer_shell::bulk::{Delivery, Mode};
 use puffer_shell::{NoParams, Profile, Stamp};
 use std::path::Path;
@@ -138,4 +138,37 @@ async fn a_bag_is_played_with_its_timing_to_those_who_listen() {
     assert!(player.play(bag.messages(&[]).unwrap(), Some(0.0)).await.is_err());
     speaker.stop().stop();
     assert_eq!(player.play(bag.messages(&[]).unwrap(), Some(1.0)).await.unwrap(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recording_is_readable_while_it_goes_on_and_whole_when_it_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let domain = free_domain();
+    let sender = node::<NoParams>("sender", domain).await;
+    let plain = sender.publisher::<Clock>("/ticks", Profile::Standard).unwrap();
+    let points = sender.bulk_publisher("/points", Mode::Queue { depth: 4 }).unwrap();
+    let recorder = node::<NoParams>("recorder", domain).await;
+    let bag = BagWriter::create(&path).unwrap();
+    let recording = Recording::start(&recorder, &topics(), bag).unwrap();
+    plain.wait_for_readers(1, SOON).await.unwrap();
+    points.wait_for_readers(1, SOON).await.unwrap();
+    points.publish_message(&cloud(1)).await.unwrap();
+    for k in 0..5 {
+        plain.publish(&tick(k)).unwrap();
+    }
+    // Quiet from here on: nothing but the clock of the recorder brings the messages to the file.
+    let count = || BagReader::open(&path).unwrap().info().count;
+    eventually("all messages are in the file", || count() == 6).await;
+    assert_eq!(BagReader::open(&path).unwrap().info().damage.len(), 1);
+
+    recorder.stop().stop();
+    assert_eq!(timeout(SOON, recording.finished()).await.unwrap().unwrap(), 6);
+    let bag = BagReader::open(&path).unwrap();
+    assert!(bag.info().damage.is_empty(), "{:?}", bag.info());
+    let all: Vec<BagMessage> = bag.messages(&[]).unwrap().map(|m| m.unwrap()).collect();
+    assert_eq!(of::<Clock>(&all, "/ticks"), ticks());
+    assert!(of::<PointCloud2>(&all, "/points") == [cloud(1)]);
+    let profiles: Vec<Profile> = bag.info().topics.iter().map(|t| t.profile()).collect();
+    assert_eq!(profiles, [Profile::Latched, Profile::Standard, Profile::Standard]);
 }
