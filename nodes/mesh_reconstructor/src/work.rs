@@ -6,10 +6,10 @@ use puffer_core::mesh::io::{Unit, write_mesh};
 use puffer_core::mesh::{Mesh, genus, is_closed, is_oriented, is_two_manifold};
 use puffer_core::pipeline::{self, Poses, comments};
 use puffer_core::reconstruct::reconstruct;
+use puffer_core::scans::ScanSource;
 use puffer_core::{Error, Progress};
 use puffer_msgs::srv::{ReconstructRequest, ReconstructResponse};
-use puffer_shell::bag;
-use puffer_shell::scans::RegistrarParams;
+use puffer_shell::scans::{RegistrarParams, is_bag, scans_of_bag};
 use std::path::Path;
 use std::time::Instant;
 
@@ -69,8 +69,14 @@ fn from_file(
 ) -> puffer_core::Result<(Mesh, Cloud)> {
     let of_registrar =
         RegistrarParams { scan: params.scan.clone(), register: params.register.clone() };
-    let input = if bag::is_bag(input) {
-        pipeline::Input::Scans(bag::scans(input, &of_registrar, progress)?)
+    let input = if is_bag(input) {
+        let scans = scans_of_bag(input, &of_registrar, progress).map_err(|error| {
+            match error.downcast::<Error>() {
+                Ok(error) => error,
+                Err(other) => Error::Input(format!("{other:#}")),
+            }
+        })?;
+        pipeline::Input::Scans(ScanSource::of(scans))
     } else {
         pipeline::Input::open(input, Unit::M)?
     };

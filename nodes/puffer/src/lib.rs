@@ -2,9 +2,13 @@
 
 pub mod commands;
 mod failure;
+mod fleet;
+mod nodes;
 mod parameters;
 mod picture;
 mod progress;
+mod run;
+mod setups;
 mod table;
 
 use clap::Parser;
@@ -37,7 +41,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     match set_threads(cli.threads).and_then(|()| cli.command.run()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(status) => status,
         Err(error) => {
             eprintln!("puffer: {error:#}");
             ExitCode::from(failure::status(&error))

@@ -30,14 +30,8 @@ macro_rules! kinds {
 }
 
 /// All nodes, in the order in which they are started: those that listen before those that speak.
-pub(crate) static NODES: [NodeKind; 6] = kinds![
-    mesh_reconstructor,
-    cloud_filter,
-    nbv_planner,
-    scan_registrar,
-    modeller,
-    mock_driver
-];
+pub(crate) static NODES: [NodeKind; 6] =
+    kinds![mesh_reconstructor, cloud_filter, nbv_planner, scan_registrar, modeller, mock_driver];
 
 /// The node of that name.
 pub(crate) fn find(name: &str) -> Option<&'static NodeKind> {

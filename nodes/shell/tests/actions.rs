@@ -1,5 +1,8 @@
 //! Actions between two nodes over DDS.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, eventually, free_domain, node};

@@ -1,5 +1,7 @@
 //! The bulk transport over real DDS: several participants in one process, each with a context of its own.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::bulk::{BulkError, BulkPublisher, BulkSubscription, Delivery, Mode};
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions};

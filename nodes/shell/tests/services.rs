@@ -1,5 +1,8 @@
 //! Services and parameters between two nodes over DDS, by both conventions.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, eventually, free_domain, node, node_with};
@@ -24,6 +27,7 @@ puffer_core::params! {
 puffer_core::param_groups! {
     /// For the tests.
     pub struct Params {
+        /// What is seen.
         view: View,
     }
 }
@@ -90,7 +94,7 @@ async fn a_call_that_fails_says_why() {
     let request = SetBoolRequest { data: true };
     let error = client.call(&request, Duration::from_millis(100)).await.unwrap_err();
     assert!(matches!(error, CallError::NoServer { .. }), "{error}");
-    assert!(error.to_string().contains(&format!("no server for /switch within 0.1 s")), "{error}");
+    assert!(error.to_string().contains("no server for /switch within 0.1 s"), "{error}");
 
     let handled = Arc::new(AtomicU32::new(0));
     let server = switch(args.clone(), &handled, Duration::from_secs(3600)).await;

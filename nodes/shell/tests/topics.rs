@@ -1,5 +1,8 @@
 //! Topics between two nodes over DDS: names, late joiners, logs, time, transforms.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, eventually, free_domain, node, node_with};

@@ -5,6 +5,8 @@ mod doctor;
 mod evaluate;
 mod filter;
 mod input;
+mod model;
+mod node;
 mod objects;
 mod params;
 mod reconstruct;
@@ -14,10 +16,15 @@ mod simulate;
 
 use anyhow::Result;
 use clap::Subcommand;
+use std::process::ExitCode;
 
 /// What to do.
 #[derive(Subcommand)]
 pub enum Command {
+    /// Model an object from the first view to the mesh, with a simulated robot
+    Model(model::Model),
+    /// Run one node
+    Node(node::Node),
     /// Make a watertight mesh from scans
     Reconstruct(reconstruct::Reconstruct),
     /// Correct the poses of scans
@@ -45,8 +52,10 @@ impl Command {
     ///
     /// # Errors
     /// Whatever stopped it, in words for the user.
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self) -> Result<ExitCode> {
         match self {
+            Command::Node(command) => return command.run(),
+            Command::Model(command) => command.run(),
             Command::Reconstruct(command) => command.run(),
             Command::Register(command) => command.run(),
             Command::Filter(command) => command.run(),
@@ -57,6 +66,7 @@ impl Command {
             Command::Params(command) => command.run(),
             Command::Bench(command) => command.run(),
             Command::Doctor(command) => command.run(),
-        }
+        }?;
+        Ok(ExitCode::SUCCESS)
     }
 }

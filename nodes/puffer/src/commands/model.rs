@@ -52,7 +52,11 @@ pub struct Model {
 impl Model {
     pub(super) fn run(&self) -> Result<()> {
         let Some(mut settings) = setups::settings(&self.setup) else {
-            return Err(usage(format!("there is no set-up {}; there are {}", self.setup, setups::names())));
+            return Err(usage(format!(
+                "there is no set-up {}; there are {}",
+                self.setup,
+                setups::names()
+            )));
         };
         let mut set = |node, name: &'static str, value: serde_json::Value| {
             settings.push(setups::Setting { node, name: name.into(), value });
@@ -69,7 +73,9 @@ impl Model {
         if let Some(coverage) = self.coverage {
             set("modeller", "session.coverage", coverage.into());
         }
-        settings.extend(self.settings.iter().map(|text| setups::parse(text)).collect::<Result<Vec<_>>>()?);
+        settings.extend(
+            self.settings.iter().map(|text| setups::parse(text)).collect::<Result<Vec<_>>>()?,
+        );
         setups::check(&settings)?;
         let plan = Plan {
             setup: self.setup.clone(),

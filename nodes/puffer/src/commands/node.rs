@@ -5,8 +5,8 @@ use crate::nodes::{NODES, find};
 use anyhow::Result;
 use clap::Args;
 use puffer_shell::{RosArgs, Stop};
+use std::io::Read;
 use std::process::ExitCode;
-use tokio::io::AsyncReadExt;
 
 /// Runs one node, as its own program does.
 #[derive(Args)]
@@ -26,11 +26,15 @@ impl Node {
     pub(super) fn run(&self) -> Result<ExitCode> {
         let Some(node) = find(&self.name) else {
             let names: Vec<&str> = NODES.iter().map(|kind| kind.name).collect();
-            return Err(usage(format!("there is no node {}; there are {}", self.name, names.join(", "))));
+            return Err(usage(format!(
+                "there is no node {}; there are {}",
+                self.name,
+                names.join(", ")
+            )));
         };
         let run = async |args: RosArgs, stop: Stop| {
             if self.with_parent {
-                tokio::spawn(end_with_input(stop.clone()));
+                end_with_input(stop.clone());
             }
             (node.run)(args, stop).await
         };
@@ -39,9 +43,11 @@ impl Node {
 }
 
 /// Stops the node when standard input comes to its end: whoever started it is gone.
-async fn end_with_input(stop: Stop) {
-    let mut input = tokio::io::stdin();
-    let mut bytes = [0; 64];
-    while matches!(input.read(&mut bytes).await, Ok(1..)) {}
-    stop.stop();
+fn end_with_input(stop: Stop) {
+    // A thread of its own: nothing waits for a read that never ends.
+    std::thread::spawn(move || {
+        let mut bytes = [0; 64];
+        while matches!(std::io::stdin().read(&mut bytes), Ok(1..)) {}
+        stop.stop();
+    });
 }

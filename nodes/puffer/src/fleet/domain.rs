@@ -11,7 +11,8 @@ const PARTICIPANTS: u16 = 12;
 /// Ports of a domain (RTPS 2.5, 9.6.2.3): discovery and data by multicast, and by unicast for each participant.
 fn ports(domain: u16) -> impl Iterator<Item = u16> {
     let base = 7400 + 250 * domain;
-    let of_participant = (0..PARTICIPANTS).flat_map(move |p| [base + 10 + 2 * p, base + 11 + 2 * p]);
+    let of_participant =
+        (0..PARTICIPANTS).flat_map(move |p| [base + 10 + 2 * p, base + 11 + 2 * p]);
     [base, base + 1].into_iter().chain(of_participant)
 }
 

@@ -61,10 +61,11 @@ impl Processes {
 
     pub(super) async fn loss(&mut self) -> String {
         loop {
-            for (name, child) in &mut self.children {
-                if let Ok(Some(status)) = child.try_wait() {
-                    return format!("{name} has ended ({status}): {}", self.last_words(name));
-                }
+            let ended = self.children.iter_mut().find_map(|(name, child)| {
+                child.try_wait().ok().flatten().map(|status| (*name, status))
+            });
+            if let Some((name, status)) = ended {
+                return format!("{name} has ended ({status}): {}", self.last_words(name));
             }
             tokio::time::sleep(LOOK_EVERY).await;
         }

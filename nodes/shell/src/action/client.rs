@@ -8,16 +8,19 @@ use puffer_msgs::action_msgs::msg::{GoalInfo, GoalStatus};
 use puffer_msgs::action_msgs::srv::{CancelGoal, CancelGoalRequest};
 use puffer_msgs::unique_identifier_msgs::msg::UUID;
 use puffer_msgs::{Action, FeedbackMessage, GetResultRequest, GetResultResponse, SendGoalRequest};
+use rustdds::GUID;
 use rustdds::policy::Durability;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::sync::watch;
 
 /// Feedback is read into memory at once; this many wait in DDS meanwhile.
 const FEEDBACK_DEPTH: i32 = 100;
+/// How long a goal waits for the feedback topic's match: without it the first feedback would be lost.
+const FEEDBACK_WAIT: Duration = Duration::from_secs(1);
 /// The end of a goal is asked for once and may take this long.
 const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
 
@@ -40,6 +43,7 @@ struct Inner<A: Action> {
     send_goal: Client<A::SendGoal>,
     cancel_goal: Client<CancelGoal>,
     get_result: Client<A::GetResult>,
+    feedback_reader: GUID,
     listeners: Arc<Listeners<A::Feedback>>,
     /// Ends the task that reads feedback.
     dropped: Stop,
@@ -49,6 +53,15 @@ struct Inner<A: Action> {
 impl<A: Action> Drop for Inner<A> {
     fn drop(&mut self) {
         self.dropped.stop();
+    }
+}
+
+impl<A: Action> Inner<A> {
+    /// A server that has no feedback topic is asked all the same.
+    async fn match_feedback(&self, deadline: Duration) {
+        let reader = self.feedback_reader;
+        let matched = self.send_goal.matches().wait(|matches| matches.count(reader) > 0);
+        let _ = tokio::time::timeout(deadline, matched).await;
     }
 }
 
@@ -64,6 +77,7 @@ impl<A: Action> ActionClient<A> {
             send_goal: Client::new(dds, mapping, domain, &part("send_goal"), stop)?,
             cancel_goal: Client::new(dds, mapping, domain, &part("cancel_goal"), stop)?,
             get_result: Client::new(dds, mapping, domain, &part("get_result"), stop)?,
+            feedback_reader: feedback.guid(),
             listeners: Arc::default(),
             dropped: stop.child(),
             stop: stop.clone(),
@@ -90,7 +104,10 @@ impl<A: Action> ActionClient<A> {
         let handle =
             GoalHandle { inner: Arc::clone(inner), id, feedback, ended, dropped: Stop::new() };
         let request = SendGoalRequest { goal_id: UUID { uuid: id }, goal: goal.clone() };
-        if !inner.send_goal.call(&request, deadline).await?.accepted {
+        let start = Instant::now();
+        inner.match_feedback(deadline.min(FEEDBACK_WAIT)).await;
+        let left = deadline.saturating_sub(start.elapsed());
+        if !inner.send_goal.call(&request, left).await.map_err(|e| e.within(deadline))?.accepted {
             return Ok(None);
         }
         let (get_result, dropped) = (inner.get_result.clone(), handle.dropped.clone());

@@ -106,7 +106,7 @@ impl<R: Clone + Default, W> Goals<R, W> {
             if entry.info.goal_id.uuid == id || (!any_stamp && until) || (any_id && any_stamp) {
                 entry.status = GoalStatus::STATUS_CANCELING;
                 entry.cancel.stop();
-                response.goals_canceling.push(entry.info.clone());
+                response.goals_canceling.push(entry.info);
             }
         }
         response.return_code = if !response.goals_canceling.is_empty() {
@@ -125,7 +125,7 @@ impl<R: Clone + Default, W> Goals<R, W> {
         let status_list = self
             .entries
             .iter()
-            .map(|entry| GoalStatus { goal_info: entry.info.clone(), status: entry.status })
+            .map(|entry| GoalStatus { goal_info: entry.info, status: entry.status })
             .collect();
         GoalStatusArray { status_list }
     }

@@ -129,16 +129,15 @@ impl Sender {
             member.hear(now);
             return;
         }
-        let before = (member.sequence == ack.sequence).then(|| member.have.len()).unwrap_or(0);
+        let before = if member.sequence == ack.sequence { member.have.len() } else { 0 };
         member.acknowledge(ack, now);
         let (sequence, arrived) = (member.sequence, member.have.len().saturating_sub(before));
         if arrived > 0 {
             self.window.arrived(arrived);
         }
-        if let Some(held) = self.held.iter_mut().find(|h| h.sequence == sequence) {
-            if held.find_lost(|i| member.have.has(i)) > 0 {
-                self.window.lost(now);
-            }
+        let held = self.held.iter_mut().find(|h| h.sequence == sequence);
+        if held.is_some_and(|held| held.find_lost(|i| member.have.has(i)) > 0) {
+            self.window.lost(now);
         }
         self.release();
     }

@@ -2,7 +2,7 @@
 
 use super::wire;
 use super::{CallError, SERVICE_QOS_DEPTH, endpoint_types};
-use crate::dds::{Dds, Raw, Reader, Writer, encode};
+use crate::dds::{Dds, Matches, Raw, Reader, Writer, encode};
 use crate::{ServiceMapping, Stop};
 use anyhow::Result;
 use puffer_msgs::Service;
@@ -18,6 +18,8 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 /// client and server has not worked before; doubled each time. The first call after matching can get lost,
 /// because discovery tells one side before the other.
 const FIRST_PATIENCE: Duration = Duration::from_secs(1);
+/// How long a server that has just been found is given to find this client.
+const SETTLING: Duration = Duration::from_millis(100);
 /// How long a server that was there may be away during a call (it restarts) before the call is given up.
 const ABSENCE: Duration = Duration::from_secs(3);
 
@@ -109,6 +111,11 @@ impl<S: Service> Client<S> {
         !self.inner.servers().is_empty()
     }
 
+    /// Who is matched with this and all other endpoints of the node.
+    pub(crate) fn matches(&self) -> &Matches {
+        self.inner.writer.matches()
+    }
+
     /// Absolute name of the service.
     pub fn name(&self) -> &str {
         &self.inner.name
@@ -130,14 +137,14 @@ impl Inner {
         let mut call = PendingCall { inner: self, sequences: Vec::new() };
         let mut patience = FIRST_PATIENCE;
         self.writer.matches().wait(|_| !self.servers().is_empty()).await;
+        if !self.are_proven(&self.servers()) {
+            tokio::time::sleep(SETTLING).await;
+        }
         loop {
             let servers = self.servers();
             call.send(payload, &sender)?;
             attempts.fetch_add(1, Ordering::Relaxed);
-            let proven = {
-                let proven = self.proven.lock().unwrap_or_else(PoisonError::into_inner);
-                servers.iter().all(|server| proven.contains(server))
-            };
+            let proven = self.are_proven(&servers);
             tokio::select! {
                 answer = next(&mut answers) => {
                     let mut proven = self.proven.lock().unwrap_or_else(PoisonError::into_inner);
@@ -150,6 +157,11 @@ impl Inner {
                 }
             }
         }
+    }
+
+    /// Whether all of them have answered.
+    fn are_proven(&self, servers: &BTreeSet<GUID>) -> bool {
+        self.proven.lock().unwrap_or_else(PoisonError::into_inner).is_superset(servers)
     }
 
     /// Waits for a server that has gone.

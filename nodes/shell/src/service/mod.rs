@@ -76,3 +76,15 @@ pub enum CallError {
         message: String,
     },
 }
+
+impl CallError {
+    /// The same with the deadline of the whole, of which the call was a part.
+    pub(crate) fn within(mut self, whole: Duration) -> Self {
+        if let CallError::NoServer { deadline, .. } | CallError::NoAnswer { deadline, .. } =
+            &mut self
+        {
+            *deadline = whole;
+        }
+        self
+    }
+}

@@ -1,4 +1,5 @@
 //! What the tests share: a free domain, nodes on it, and a generous deadline.
+// Each test program uses its own part of it.
 #![allow(dead_code)]
 
 use puffer_core::params::Parameters;

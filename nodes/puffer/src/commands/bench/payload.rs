@@ -6,9 +6,10 @@ use bytes::Bytes;
 pub(super) fn payload(index: u64, size: usize) -> Bytes {
     let mut bytes = Vec::with_capacity(size + 8);
     bytes.extend(index.to_le_bytes());
+    let start = mix(index);
     let mut word = 0;
     while bytes.len() < size {
-        bytes.extend(mix(index << 40 | word).to_le_bytes());
+        bytes.extend(mix(start.wrapping_add(word)).to_le_bytes());
         word += 1;
     }
     bytes.truncate(size);
@@ -18,9 +19,10 @@ pub(super) fn payload(index: u64, size: usize) -> Bytes {
 /// The number of a sample, if every byte of it is right.
 pub(super) fn check(bytes: &[u8], size: usize) -> Option<u64> {
     let index = u64::from_le_bytes(bytes.first_chunk().copied()?);
+    let start = mix(index);
     let mut words = bytes[8..].chunks(8).zip(0..);
-    let right =
-        words.all(|(chunk, word)| mix(index << 40 | word).to_le_bytes()[..chunk.len()] == *chunk);
+    let right = words
+        .all(|(chunk, word)| mix(start.wrapping_add(word)).to_le_bytes()[..chunk.len()] == *chunk);
     (bytes.len() == size && right).then_some(index)
 }
 

@@ -1,0 +1,90 @@
+//! The goal of a run, as its operator sees it.
+
+use anyhow::Result;
+use puffer_msgs::action::{ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult};
+use puffer_shell::{NoParams, Node, Outcome, Stop};
+use std::time::Duration;
+
+/// How long the modeller may take to be there and accept the goal.
+const ACCEPT_DEADLINE: Duration = Duration::from_secs(60);
+/// How long a run may take; each of its steps has a deadline of its own.
+const RUN_DEADLINE: Duration = Duration::from_secs(24 * 3600);
+/// How long a cancelled run may take to end.
+const CANCEL_DEADLINE: Duration = Duration::from_secs(30);
+
+/// How a run ended.
+pub(crate) enum Ending {
+    Modelled,
+    Cancelled,
+    Failed(String),
+}
+
+/// Sends the goal, tells how it goes, and waits for its end. When `stop` is set, the goal is cancelled.
+pub(crate) async fn pursue(node: &Node<NoParams>, object: &str, stop: &Stop) -> Result<Ending> {
+    let client = node.action_client::<ModelObject>("model_object")?;
+    let goal = ModelObjectGoal { object_name: object.to_owned(), ..ModelObjectGoal::default() };
+    let sent = match stop.or(client.send(&goal, ACCEPT_DEADLINE)).await {
+        Some(sent) => sent,
+        None => return Ok(Ending::Cancelled),
+    };
+    let Some(mut handle) = sent? else {
+        return Ok(Ending::Failed("the modeller rejects the goal: is it busy?".to_owned()));
+    };
+    let mut last = String::new();
+    loop {
+        match stop.or(handle.feedback()).await {
+            Some(Some(feedback)) => {
+                let line = line(&feedback);
+                if line != last {
+                    eprintln!("{line}");
+                    last = line;
+                }
+            }
+            Some(None) => break,
+            None => {
+                eprintln!("puffer: interrupted, stopping");
+                handle.cancel(CANCEL_DEADLINE).await?;
+                return Ok(match handle.result(CANCEL_DEADLINE).await? {
+                    Outcome::Succeeded(_) => Ending::Modelled,
+                    _ => Ending::Cancelled,
+                });
+            }
+        }
+    }
+    Ok(match handle.result(RUN_DEADLINE).await? {
+        Outcome::Succeeded(_) => Ending::Modelled,
+        Outcome::Canceled(_) => Ending::Cancelled,
+        Outcome::Aborted(ModelObjectResult { error_code, error_msg, .. }) => {
+            Ending::Failed(format!("{error_msg} (code {error_code})"))
+        }
+    })
+}
+
+/// A line of progress.
+fn line(feedback: &ModelObjectFeedback) -> String {
+    let phase = match feedback.phase {
+        ModelObjectFeedback::PREPARING => "preparing",
+        ModelObjectFeedback::PLANNING => "planning",
+        ModelObjectFeedback::MOVING => "moving",
+        ModelObjectFeedback::SCANNING => "scanning",
+        ModelObjectFeedback::REGISTERING => "registering",
+        ModelObjectFeedback::REFINING => "refining",
+        ModelObjectFeedback::FILTERING => "filtering",
+        ModelObjectFeedback::RECONSTRUCTING => "reconstructing",
+        ModelObjectFeedback::PAUSED => "paused",
+        _ => "done",
+    };
+    let mut line = format!(
+        "{:>6.1} s  {phase:<14}  {} scans, coverage {:.1} %",
+        f64::from(feedback.elapsed.sec) + f64::from(feedback.elapsed.nanosec) * 1e-9,
+        feedback.scans,
+        feedback.coverage * 100.0
+    );
+    if feedback.expected_gain > 0.0 {
+        line += &format!(", expected gain {:.0}", feedback.expected_gain);
+    }
+    if !feedback.message.is_empty() {
+        line += &format!("  ({})", feedback.message);
+    }
+    line
+}

@@ -1,0 +1,171 @@
+//! One modelling run over DDS, from start to report.
+
+mod folder;
+mod goal;
+mod results;
+mod table;
+
+use crate::fleet::{Crew, Fleet, domain};
+use crate::nodes::NODES;
+use crate::setups::{Setting, parameter_file};
+use anyhow::{Context, Result, anyhow, bail};
+use folder::RunFolder;
+use goal::{Ending, pursue};
+use puffer_core::Error;
+use puffer_core::assess::Assessment;
+use puffer_core::mesh::Mesh;
+use puffer_shell::{NoParams, Node, RosArgs, Stop};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long the runtime may take to end.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// What is to be run.
+pub(crate) struct Plan {
+    pub setup: String,
+    pub object: String,
+    pub out: Option<PathBuf>,
+    pub settings: Vec<Setting>,
+    pub one_process: bool,
+    pub domain: Option<u16>,
+    pub bag: bool,
+}
+
+/// A run whose folder is made.
+pub(crate) struct Run {
+    plan: Plan,
+    folder: RunFolder,
+    domain: u16,
+}
+
+impl Run {
+    /// Makes the run folder, finds a domain and writes the parameter file.
+    ///
+    /// # Errors
+    /// An object that cannot be simulated, a folder that is taken, or a domain in use.
+    pub(crate) fn new(mut plan: Plan) -> Result<Run> {
+        check_object(&plan.object)?;
+        let domain = match plan.domain {
+            Some(domain) if !domain::is_free(domain) => {
+                bail!(
+                    "DDS domain {domain} is in use by another program: leave --domain out to get a free one"
+                )
+            }
+            Some(domain) => domain,
+            None => domain::free()?,
+        };
+        let stem = Path::new(&plan.object)
+            .file_stem()
+            .map_or_else(String::new, |s| s.to_string_lossy().into());
+        let folder = RunFolder::create(plan.out.as_deref(), &format!("{}-{stem}", plan.setup))?;
+        let text = |path: &Path| Value::from(path.display().to_string());
+        for (node, name, value) in [
+            ("mock_driver", "driver.truth_folder", text(folder.path())),
+            ("mesh_reconstructor", "mesh.output_folder", text(folder.path())),
+            ("modeller", "modeller.run_folder", text(folder.path())),
+            ("modeller", "modeller.mesh_path", "mesh.ply".into()),
+        ] {
+            plan.settings.push(Setting { node, name: name.into(), value });
+        }
+        let params = folder.file("params.yaml");
+        std::fs::write(&params, parameter_file(&plan.settings))
+            .with_context(|| format!("cannot write {}", params.display()))?;
+        Ok(Run { plan, folder, domain })
+    }
+
+    /// Runs it and prints the results.
+    ///
+    /// # Errors
+    /// Whatever kept a mesh from being made; what was measured is in the run folder.
+    pub(crate) fn model(self, json: bool) -> Result<()> {
+        let since = Instant::now();
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+        let driven = runtime.block_on(self.drive());
+        runtime.shutdown_timeout(GRACE);
+        let (ending, problems) = driven?;
+        for problem in &problems {
+            eprintln!("puffer: {problem}");
+        }
+        let assessment = results::finish(&self.folder)?;
+        let facts = self.facts(&ending, assessment.as_ref(), since.elapsed());
+        results::extend_report(&self.folder, facts)?;
+        let report = results::report(&self.folder);
+        match ending {
+            Ending::Modelled => {
+                table::print(&report, assessment.as_ref(), self.folder.path(), json);
+                Ok(())
+            }
+            Ending::Cancelled => {
+                eprintln!(
+                    "puffer: interrupted; what was measured is in {}",
+                    self.folder.path().display()
+                );
+                Err(Error::Cancelled.into())
+            }
+            Ending::Failed(why) => {
+                Err(anyhow!("{why}; what was measured is in {}", self.folder.path().display()))
+            }
+        }
+    }
+
+    /// Starts the nodes, pursues the goal, and stops them again; what they had to complain of at the end.
+    async fn drive(&self) -> Result<(Ending, Vec<String>)> {
+        let stop = Stop::on_signals()?;
+        let crew = Crew {
+            nodes: NODES.iter().collect(),
+            domain: self.domain,
+            params: self.folder.file("params.yaml"),
+            log: self.folder.file("log.txt"),
+        };
+        eprintln!("run folder {}", self.folder.path().display());
+        let mut fleet = Fleet::start(&crew, self.plan.one_process)?;
+        let roll: Vec<String> =
+            fleet.roll().iter().map(|(name, process)| format!("{name} {process}")).collect();
+        eprintln!("nodes on DDS domain {}: {}", self.domain, roll.join(", "));
+        // Its own stop: Ctrl-C cancels the goal first, and the goal needs the node.
+        let args = RosArgs::default().with_domain(self.domain);
+        let node: Node<NoParams> = Node::start("puffer_model", args, Stop::new()).await?;
+        let ending = tokio::select! {
+            ending = pursue(&node, &self.plan.object, &stop) => ending?,
+            why = fleet.loss() => Ending::Failed(why),
+        };
+        Ok((ending, fleet.stop().await))
+    }
+
+    /// What the report says beside the modeller's part.
+    fn facts(
+        &self,
+        ending: &Ending,
+        assessment: Option<&Assessment>,
+        wall: Duration,
+    ) -> Map<String, Value> {
+        let mut facts = Map::new();
+        let mut add = |key: &str, value: Value| facts.insert(key.to_owned(), value);
+        add("program", json!(format!("puffer {}", env!("CARGO_PKG_VERSION"))));
+        add("setup", json!(self.plan.setup));
+        add("object", json!(self.plan.object));
+        add("domain", json!(self.domain));
+        add("one_process", json!(self.plan.one_process));
+        add("wall_seconds", json!(wall.as_secs_f64()));
+        add("evaluation", results::figures(assessment));
+        if let Ending::Failed(why) = ending {
+            add("failure", json!(why));
+        }
+        facts
+    }
+}
+
+/// An object that cannot be simulated is told before anything is started.
+fn check_object(object: &str) -> Result<()> {
+    let path = Path::new(object);
+    if path.extension().is_some() || path.exists() {
+        let mesh: Mesh = puffer_core::mesh::io::read_mesh(path)?;
+        puffer_core::simulate::objects::check_ground_truth(&mesh)
+            .with_context(|| object.to_owned())?;
+    } else if !puffer_core::simulate::objects::names().contains(&object) {
+        puffer_core::simulate::objects::make(object)?;
+    }
+    Ok(())
+}

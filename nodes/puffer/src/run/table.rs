@@ -1,0 +1,85 @@
+//! The table of results.
+
+use crate::table::Report;
+use puffer_core::assess::Assessment;
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// Stages in their order.
+const STAGES: [&str; 7] = ["plan", "move", "scan", "register", "refine", "filter", "reconstruct"];
+
+/// Prints what came of a run.
+pub(crate) fn print(
+    report: &Map<String, Value>,
+    assessment: Option<&Assessment>,
+    folder: &Path,
+    json: bool,
+) {
+    let number = |key: &str| report.get(key).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let mut table = Report::default();
+    let (scans, accepted) = (number("scans"), number("accepted_scans"));
+    let edge = report
+        .get("views")
+        .and_then(Value::as_array)
+        .and_then(|views| views.last()?.get("voxel_edge")?.as_f64())
+        .unwrap_or(f64::NAN);
+    let text = format!("{scans} ({accepted} registered), voxel edge {:.1} mm", edge * 1e3);
+    table.add("scans", text, "scans", scans);
+    table.add_value("accepted_scans", accepted);
+    table.add_value("voxel_edge_mm", edge * 1e3);
+    let why = report.get("reason").and_then(Value::as_str).unwrap_or_default();
+    let text = format!("{:.1} % of the known surface; ended: {why}", number("coverage") * 100.0);
+    table.add("coverage", text, "coverage", number("coverage"));
+    if let Some(found) = assessment {
+        figures(&mut table, found);
+    }
+    times(&mut table, report, number("wall_seconds"), number("simulated_seconds"));
+    let folder = folder.display().to_string();
+    table.add("run folder", folder.clone(), "run_folder", folder);
+    table.print(json);
+}
+
+fn figures(table: &mut Report, found: &Assessment) {
+    let topology = &found.topology;
+    let yes = |good: bool| if good { "yes" } else { "NO" };
+    let text = format!(
+        "closed {}, two-manifold {}, oriented {}, genus {}, components {}, self-intersecting faces {}",
+        yes(topology.closed),
+        yes(topology.two_manifold),
+        yes(topology.oriented),
+        topology.genus.map_or_else(|| "undefined".to_owned(), |g| g.to_string()),
+        topology.components,
+        topology.self_intersecting_faces
+    );
+    table.add("mesh", text, "closed", topology.closed);
+    table.add_value("two_manifold", topology.two_manifold);
+    table.add_value("oriented", topology.oriented);
+    table.add_value("genus", topology.genus);
+    table.add_value("components", topology.components);
+    table.add_value("self_intersecting_faces", topology.self_intersecting_faces);
+    let text = format!("{:.3} mm (mean {:.3} mm)", found.crms_rms, found.crms_mean);
+    table.add("cRMS", text, "crms_rms", found.crms_rms);
+    table.add_value("crms_mean", found.crms_mean);
+    let seen = found.completeness_seen_rms;
+    let whole = found.aligned.completeness_rms;
+    let text = match seen {
+        Some(seen) => format!("{seen:.3} mm on what was seen, {whole:.3} mm on all"),
+        None => format!("{whole:.3} mm"),
+    };
+    table.add("completeness", text, "completeness_rms", whole);
+    table.add_value("completeness_seen_rms", seen);
+    let text = format!("{:.2} mm", found.aligned.hausdorff);
+    table.add("Hausdorff", text, "hausdorff", found.aligned.hausdorff);
+}
+
+fn times(table: &mut Report, report: &Map<String, Value>, wall: f64, simulated: f64) {
+    let stages = report.get("stage_seconds").and_then(Value::as_object);
+    let parts: Vec<String> = STAGES
+        .iter()
+        .filter_map(|stage| Some(format!("{stage} {:.1}", stages?.get(*stage)?.as_f64()?)))
+        .collect();
+    let text = format!("{wall:.0} s ({}); the robot's clock: {simulated:.0} s", parts.join(", "));
+    table.add("time", text, "wall_seconds", wall);
+    table.add_value("simulated_seconds", simulated);
+    table.add_value("stage_seconds", stages.cloned().unwrap_or_default());
+}
