@@ -4,7 +4,7 @@
 2. Our reader (the example read_bag) reads that bag, the same bag cut off, and bags that rosbags wrote.
 
 bag_check.py FOLDER_OF_THE_EXAMPLES, after: cargo build --release -p puffer_shell --examples
-Wants: pip install rosbags==0.11.9 mcap-ros2-support==0.6.0 (mcap 1.6.0)
+Wants: pip install -r requirements-bags.txt
 """
 
 import json
