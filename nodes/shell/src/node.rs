@@ -122,7 +122,15 @@ impl<P: Parameters> Node<P> {
         params::serve(self, &inner.params, inner.clock.clone(), events)
     }
 
-    fn resolve(&self, name: &str) -> Result<String> {
+    pub(crate) fn dds(&self) -> &Dds {
+        &self.inner.dds
+    }
+
+    pub(crate) fn clock(&self) -> Clock {
+        self.inner.clock.clone()
+    }
+
+    pub(crate) fn resolve(&self, name: &str) -> Result<String> {
         self.inner.names.resolve(name).with_context(|| format!("node {}", self.full_name()))
     }
 

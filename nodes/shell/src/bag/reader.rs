@@ -60,7 +60,7 @@ impl BagReader {
         Messages::new(&self.files, topics)
     }
 
-    /// Notes of this name; those of several records put together, the later ones first.
+    /// Notes of this name; those of several records are put together, and the later ones count.
     pub fn metadata(&self, name: &str) -> Option<BTreeMap<String, String>> {
         let records = self.files.iter().flat_map(|file| &file.metadata);
         let mut found = records.filter(|(other, _)| other == name).map(|(_, notes)| notes.clone());

@@ -11,8 +11,8 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// Uncompressed size at which a chunk is closed, bytes: little is lost when a recording is cut off, and chunks are large
-/// enough to compress well.
+/// Messages that make a chunk, bytes: little is lost when a recording is cut off, and chunks are large enough to compress
+/// well. A larger message is a chunk of its own.
 const CHUNK: usize = 2 << 20;
 
 /// Writes a bag, an `.mcap` file. Dropping it closes the file without the notes of rosbag2: see [`BagWriter::finish`].
@@ -100,6 +100,9 @@ impl BagWriter {
             log_time: time(log_time)?,
             publish_time: time(publish_time)?,
         };
+        if self.open > 0 && self.open + bytes.len() > CHUNK {
+            self.flush()?;
+        }
         self.writer
             .write_to_known_channel(&header, bytes)
             .map_err(|error| refused(&self.path, "write a message", error))?;
@@ -107,7 +110,7 @@ impl BagWriter {
         let (start, end) = self.range.unwrap_or((log_time, log_time));
         self.range = Some((start.min(log_time), end.max(log_time)));
         self.open += bytes.len();
-        if self.open >= CHUNK { self.flush() } else { Ok(()) }
+        Ok(())
     }
 
     /// Closes the open chunk and gives it to the system: what was written so far is safe when the process dies.

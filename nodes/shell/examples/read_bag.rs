@@ -1,0 +1,51 @@
+//! Prints a bag as lines of JSON, first its overview, then each message: `read_bag BAG`. tests/independent/bag_check.py
+//! holds them against other implementations.
+
+use puffer_msgs::{Interface, TypeVisitor, visit_types};
+use puffer_shell::bag::{BagError, BagMessage, BagReader};
+use serde_json::{Value, json};
+use std::io::Write;
+
+fn main() -> anyhow::Result<()> {
+    let path = std::env::args().nth(1).ok_or_else(|| anyhow::anyhow!("read_bag BAG"))?;
+    let bag = BagReader::open(&path)?;
+    let info = bag.info();
+    let topic = |topic: &puffer_shell::bag::BagTopic| {
+        let profile = format!("{:?}", topic.profile());
+        json!([&*topic.name, &*topic.type_name, topic.count, profile])
+    };
+    let mut out = std::io::stdout().lock();
+    let overview = json!({
+        "topics": info.topics.iter().map(topic).collect::<Vec<_>>(),
+        "start": info.start.nanos(), "end": info.end.nanos(), "damage": info.damage,
+        "notes": bag.metadata("puffer"),
+    });
+    writeln!(out, "{overview}")?;
+    for message in bag.messages(&[])? {
+        let message = message?;
+        let mut decode = Decode { message: &message, value: None };
+        visit_types(&mut decode);
+        let line = json!({
+            "topic": &*message.topic, "type": &*message.type_name,
+            "log_time": message.log_time.nanos(), "publish_time": message.publish_time.nanos(),
+            "message": decode.value.transpose()?,
+        });
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+/// Looks for the message's type.
+struct Decode<'a> {
+    message: &'a BagMessage,
+    value: Option<Result<Value, BagError>>,
+}
+
+impl TypeVisitor for Decode<'_> {
+    fn visit<T: Interface>(&mut self) {
+        if *self.message.type_name == *T::TYPE_NAME {
+            let message = self.message.decode::<T>();
+            self.value = Some(message.map(|m| serde_json::to_value(m).unwrap_or_default()));
+        }
+    }
+}

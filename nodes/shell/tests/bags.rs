@@ -1,0 +1,174 @@
+//! A bag recorded from topics, and played to others.
+
+mod common;
+
+use common::{SOON, eventually, free_domain, node};
+use puffer_msgs::rosgraph_msgs::msg::Clock;
+use puffer_msgs::sensor_msgs::msg::PointCloud2;
+use puffer_msgs::{Interface, cdr};
+use puffer_shell::bag::{BagMessage, BagReader, BagWriter, Player, Recording, TopicRoute, record};
+use puffer_shell::bulk::{Delivery, Mode};
+use puffer_shell::{NoParams, Profile, Stamp};
+use std::path::Path;
+use tokio::sync::mpsc::Receiver;
+use tokio::time::timeout;
+
+const CLOUD: usize = 3_000_000;
+
+fn topics() -> [TopicRoute; 3] {
+    [
+        TopicRoute::plain("/ticks", Clock::TYPE_NAME, Profile::Standard),
+        TopicRoute::plain("/latched", Clock::TYPE_NAME, Profile::Latched),
+        TopicRoute::bulk("/points", PointCloud2::TYPE_NAME, false),
+    ]
+}
+
+fn tick(k: i32) -> Clock {
+    Clock { clock: puffer_msgs::builtin_interfaces::msg::Time { sec: k, nanosec: 7 } }
+}
+
+fn cloud(k: u8) -> PointCloud2 {
+    let data = (0..CLOUD).map(|i| (i % 251) as u8 ^ k).collect();
+    PointCloud2 { width: CLOUD as u32, data, ..PointCloud2::default() }
+}
+
+async fn take(messages: &mut Receiver<BagMessage>, count: usize) -> Vec<BagMessage> {
+    let mut all = Vec::new();
+    while all.len() < count {
+        let next = timeout(SOON, messages.recv()).await;
+        all.push(next.unwrap_or_else(|_| panic!("{} messages only", all.len())).unwrap());
+    }
+    all
+}
+
+/// Messages of a topic.
+fn of<M: Interface>(all: &[BagMessage], topic: &str) -> Vec<M> {
+    all.iter().filter(|m| &*m.topic == topic).map(|m| m.decode().unwrap()).collect()
+}
+
+fn bag(path: &Path) -> BagReader {
+    let mut bag = BagWriter::create(path).unwrap();
+    for entry in topics() {
+        bag.add_topic(&entry.topic, &entry.type_name, entry.profile()).unwrap();
+    }
+    let mut put = |topic: &str, kind: &str, bytes: &[u8], millis: i64| {
+        let at = Stamp::from_nanos(millis * 1_000_000);
+        bag.write(topic, kind, bytes, at, at).unwrap();
+    };
+    put("/latched", Clock::TYPE_NAME, &cdr::to_bytes(&tick(-1)).unwrap(), 0);
+    for k in 0..5 {
+        let at = 100 * i64::from(k);
+        put("/ticks", Clock::TYPE_NAME, &cdr::to_bytes(&tick(k)).unwrap(), at);
+        put("/points", PointCloud2::TYPE_NAME, &cdr::to_bytes(&cloud(k as u8)).unwrap(), at);
+    }
+    put("/unwanted", Clock::TYPE_NAME, &cdr::to_bytes(&tick(9)).unwrap(), 50);
+    bag.finish().unwrap();
+    BagReader::open(path).unwrap()
+}
+
+fn ticks() -> Vec<Clock> {
+    (0..5).map(tick).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_published_is_recorded_unread() {
+    let domain = free_domain();
+    let sender = node::<NoParams>("sender", domain).await;
+    let latched = sender.publisher::<Clock>("/latched", Profile::Latched).unwrap();
+    latched.publish(&tick(-1)).unwrap();
+    let plain = sender.publisher::<Clock>("/ticks", Profile::Standard).unwrap();
+    let points = sender.bulk_publisher("/points", Mode::Queue { depth: 4 }).unwrap();
+
+    let recorder = node::<NoParams>("recorder", domain).await;
+    let mut messages = record(&recorder, &topics()).unwrap();
+    plain.wait_for_readers(1, SOON).await.unwrap();
+    points.wait_for_readers(1, SOON).await.unwrap();
+    let before = Stamp::wall();
+    for k in 0..5 {
+        plain.publish(&tick(k)).unwrap();
+        points.publish_message(&cloud(k as u8)).await.unwrap();
+    }
+    let all = take(&mut messages, 11).await;
+    assert_eq!(of::<Clock>(&all, "/ticks"), ticks());
+    assert_eq!(of::<Clock>(&all, "/latched"), [tick(-1)]);
+    let clouds: Vec<PointCloud2> = of(&all, "/points");
+    assert!(clouds == (0..5).map(cloud).collect::<Vec<_>>());
+    assert!(all.iter().all(|m| m.bytes[..4] == [0, 1, 0, 0] && m.log_time <= Stamp::wall()));
+    assert!(all.iter().filter(|m| &*m.topic == "/ticks").all(|m| m.log_time >= before));
+
+    recorder.stop().stop();
+    assert!(timeout(SOON, messages.recv()).await.unwrap().is_none(), "the recording ends");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bag_is_played_with_its_timing_to_those_who_listen() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = bag(&folder.path().join("run.mcap"));
+    let domain = free_domain();
+    let listener = node::<NoParams>("listener", domain).await;
+    let mut heard = listener.subscribe::<Clock>("/ticks", Profile::Standard).unwrap();
+    let clouds = listener.bulk_subscribe::<PointCloud2>("/points", Delivery::Every).unwrap();
+
+    let speaker = node::<NoParams>("speaker", domain).await;
+    let player = Player::new(&speaker, &topics()).unwrap();
+    let error = player.wait_for_readers(std::time::Duration::from_millis(1)).await.unwrap_err();
+    assert!(error.to_string().contains("nobody came to read /latched"), "{error}");
+    let mut late = listener.subscribe::<Clock>("/latched", Profile::LatchedSub).unwrap();
+    player.wait_for_readers(SOON).await.unwrap();
+
+    let taken = tokio::spawn(async move {
+        let mut all = Vec::new();
+        for _ in 0..5 {
+            all.push(timeout(SOON, clouds.next()).await.unwrap().unwrap());
+        }
+        all
+    });
+    let begun = std::time::Instant::now();
+    let count = player.play(bag.messages(&[]).unwrap(), Some(0.5)).await.unwrap();
+    assert_eq!(count, 11, "all but the topic that is not named");
+    // The last message lies 0.4 s after the first, and it is played at half the speed.
+    assert!(begun.elapsed().as_secs_f64() >= 0.8);
+    player.flush(SOON).await.unwrap();
+    for k in 0..5 {
+        assert_eq!(heard.next_within(SOON).await.unwrap(), tick(k));
+    }
+    assert_eq!(late.next_within(SOON).await.unwrap(), tick(-1));
+    assert!(taken.await.unwrap() == (0..5).map(cloud).collect::<Vec<_>>());
+
+    assert!(player.play(bag.messages(&[]).unwrap(), Some(0.0)).await.is_err());
+    speaker.stop().stop();
+    assert_eq!(player.play(bag.messages(&[]).unwrap(), Some(1.0)).await.unwrap(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recording_is_readable_while_it_goes_on_and_whole_when_it_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let domain = free_domain();
+    let sender = node::<NoParams>("sender", domain).await;
+    let plain = sender.publisher::<Clock>("/ticks", Profile::Standard).unwrap();
+    let points = sender.bulk_publisher("/points", Mode::Queue { depth: 4 }).unwrap();
+    let recorder = node::<NoParams>("recorder", domain).await;
+    let bag = BagWriter::create(&path).unwrap();
+    let recording = Recording::start(&recorder, &topics(), bag).unwrap();
+    plain.wait_for_readers(1, SOON).await.unwrap();
+    points.wait_for_readers(1, SOON).await.unwrap();
+    points.publish_message(&cloud(1)).await.unwrap();
+    for k in 0..5 {
+        plain.publish(&tick(k)).unwrap();
+    }
+    // Quiet from here on: nothing but the clock of the recorder brings the messages to the file.
+    let count = || BagReader::open(&path).unwrap().info().count;
+    eventually("all messages are in the file", || count() == 6).await;
+    assert_eq!(BagReader::open(&path).unwrap().info().damage.len(), 1);
+
+    recorder.stop().stop();
+    assert_eq!(timeout(SOON, recording.finished()).await.unwrap().unwrap(), 6);
+    let bag = BagReader::open(&path).unwrap();
+    assert!(bag.info().damage.is_empty(), "{:?}", bag.info());
+    let all: Vec<BagMessage> = bag.messages(&[]).unwrap().map(|m| m.unwrap()).collect();
+    assert_eq!(of::<Clock>(&all, "/ticks"), ticks());
+    assert!(of::<PointCloud2>(&all, "/points") == [cloud(1)]);
+    let profiles: Vec<Profile> = bag.info().topics.iter().map(|t| t.profile()).collect();
+    assert_eq!(profiles, [Profile::Latched, Profile::Standard, Profile::Standard]);
+}
