@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{SOON, eventually, free_domain, node};
+use common::{SOON, free_domain, node};
 use puffer_msgs::action::{Refine, RefineFeedback, RefineGoal, RefineResult};
 use puffer_msgs::action_msgs::msg::{GoalStatus, GoalStatusArray};
 use puffer_shell::{CallError, Goal, NoParams, Node, Outcome, Profile};
@@ -56,9 +56,8 @@ async fn a_goal_gives_feedback_and_a_result_that_stays() {
         .subscribe::<GoalStatusArray>("/server/refine/_action/status", Profile::LatchedSub)
         .unwrap();
     let client = caller.action_client::<Refine>("/server/refine").unwrap();
-    // Feedback is not latched: without a match it would be lost.
-    eventually("the server is matched", || client.is_ready()).await;
     let mut goal = client.send(&RefineGoal::default(), SOON).await.unwrap().unwrap();
+    assert!(goal.feedback().await.is_some(), "the first feedback is lost");
     for _ in 0..2 {
         let outcome = goal.result(SOON).await.unwrap();
         assert!(matches!(outcome, Outcome::Succeeded(r) if r.error_msg == "done"));

@@ -158,6 +158,7 @@ async fn transforms_travel_and_late_joiners_get_the_static_ones() {
         () = ticking => unreachable!(),
     };
     assert!((pose.translation.x - 0.75).abs() < 1e-12);
+    assert_eq!(robot.tf().unwrap().lookup("table", "sensor", at).unwrap(), pose);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -21,8 +21,6 @@ use tokio::sync::watch;
 const FEEDBACK_DEPTH: i32 = 100;
 /// How long a goal waits for the feedback topic's match: without it the first feedback would be lost.
 const FEEDBACK_WAIT: Duration = Duration::from_secs(1);
-/// The end of a goal is asked for once and may take this long.
-const FOR_EVER: Duration = Duration::from_secs(u32::MAX as u64);
 
 type Listeners<F> = Mutex<BTreeMap<GoalId, UnboundedSender<F>>>;
 type End<R> = Option<Result<GetResultResponse<R>, CallError>>;
@@ -113,7 +111,7 @@ impl<A: Action> ActionClient<A> {
         let (get_result, dropped) = (inner.get_result.clone(), handle.dropped.clone());
         tokio::spawn(async move {
             let request = GetResultRequest { goal_id: UUID { uuid: id } };
-            if let Some(answer) = dropped.or(get_result.call(&request, FOR_EVER)).await {
+            if let Some(answer) = dropped.or(get_result.call_known(&request)).await {
                 end.send_replace(Some(answer));
             }
         });

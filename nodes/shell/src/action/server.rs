@@ -14,8 +14,11 @@ use puffer_msgs::unique_identifier_msgs::msg::UUID;
 use puffer_msgs::{Action, GetResultResponse, SendGoalRequest, SendGoalResponse};
 use rustdds::policy::Durability;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 const FEEDBACK_DEPTH: i32 = 10;
+/// How long a goal waits for its client to be matched with the feedback topic.
+const FEEDBACK_WAIT: Duration = Duration::from_millis(200);
 
 /// Makes the action's services and topics and answers them until the node stops.
 pub(crate) fn serve<A, C, H, F>(place: Place<'_>, accept: C, execute: H) -> Result<()>
@@ -91,11 +94,22 @@ impl<A: Action> Desk<A> {
             };
             server.answer(&call, &SendGoalResponse { accepted, stamp: stamp.into() }).await;
             if let Some(goal) = goal {
+                self.match_feedback(&call).await;
                 let cancel = goal.flag();
                 let work = execute(goal);
                 tokio::spawn(Arc::clone(&self).run(id, cancel, work));
             }
         }
+    }
+
+    /// Waits until the client hears feedback; without it the first would be lost.
+    async fn match_feedback(&self, call: &Call) {
+        let writer = self.feedback.guid();
+        let matched = self.feedback.matches().wait(|matches| {
+            matches.of(writer).iter().any(|reader| call.is_from_participant_of(reader))
+        });
+        // A client that does not care for feedback is served all the same.
+        let _ = tokio::time::timeout(FEEDBACK_WAIT, matched).await;
     }
 
     fn enter(&self, id: GoalId, goal: A::Goal, stamp: Stamp) -> Goal<A> {

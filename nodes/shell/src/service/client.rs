@@ -97,13 +97,30 @@ impl<S: Service> Client<S> {
         let inner = &self.inner;
         let payload = encode(request).map_err(|message| inner.transport(message))?;
         let attempts = AtomicU32::new(0);
-        let exchange = tokio::time::timeout(deadline, inner.exchange(&payload, &attempts));
+        let exchange = tokio::time::timeout(deadline, async {
+            inner.writer.matches().wait(|_| !inner.servers().is_empty()).await;
+            inner.exchange(&payload, &attempts).await
+        });
         let raw = match inner.stop.or(exchange).await {
             None => return Err(CallError::Stopped { service: inner.name.clone() }),
             Some(Ok(answer)) => answer?,
             Some(Err(_)) => return Err(inner.too_late(attempts.into_inner(), deadline)),
         };
         raw.decode().map_err(|message| inner.transport(message))
+    }
+
+    /// Asks a server that is known to be there, and waits without a deadline.
+    ///
+    /// # Errors
+    /// As [`Client::call`], but for the deadline.
+    pub(crate) async fn call_known(&self, request: &S::Request) -> Result<S::Response, CallError> {
+        let inner = &self.inner;
+        let payload = encode(request).map_err(|message| inner.transport(message))?;
+        let attempts = AtomicU32::new(0);
+        match inner.stop.or(inner.exchange(&payload, &attempts)).await {
+            None => Err(CallError::Stopped { service: inner.name.clone() }),
+            Some(raw) => raw?.decode().map_err(|message| inner.transport(message)),
+        }
     }
 
     /// Whether a server is matched now.
@@ -136,12 +153,13 @@ impl Inner {
         let (sender, mut answers) = unbounded_channel();
         let mut call = PendingCall { inner: self, sequences: Vec::new() };
         let mut patience = FIRST_PATIENCE;
-        self.writer.matches().wait(|_| !self.servers().is_empty()).await;
         if !self.are_proven(&self.servers()) {
             tokio::time::sleep(SETTLING).await;
         }
         loop {
+            self.come_back().await?;
             let servers = self.servers();
+            let gone = || servers.is_empty() || !self.servers().is_superset(&servers);
             call.send(payload, &sender)?;
             attempts.fetch_add(1, Ordering::Relaxed);
             let proven = self.are_proven(&servers);
@@ -152,9 +170,7 @@ impl Inner {
                     return Ok(answer);
                 }
                 () = tokio::time::sleep(patience), if !proven => patience *= 2,
-                () = self.writer.matches().wait(|_| !self.servers().is_superset(&servers)) => {
-                    self.come_back().await?;
-                }
+                () = self.writer.matches().wait(|_| gone()) => {}
             }
         }
     }
@@ -164,7 +180,7 @@ impl Inner {
         self.proven.lock().unwrap_or_else(PoisonError::into_inner).is_superset(servers)
     }
 
-    /// Waits for a server that has gone.
+    /// Waits for a server if there is none any more.
     async fn come_back(&self) -> Result<(), CallError> {
         let back = self.writer.matches().wait(|_| !self.servers().is_empty());
         tokio::time::timeout(ABSENCE, back)

@@ -34,6 +34,13 @@ pub(crate) struct Call {
     asker: GUID,
 }
 
+impl Call {
+    /// Whether `endpoint` belongs to the participant that asks.
+    pub fn is_from_participant_of(&self, endpoint: &GUID) -> bool {
+        self.asker.prefix == endpoint.prefix
+    }
+}
+
 impl<S: Service> Server<S> {
     /// `name` is absolute.
     pub fn new(dds: &Dds, mapping: ServiceMapping, name: &str) -> Result<Self> {
@@ -100,11 +107,10 @@ impl<S: Service> Server<S> {
                 return;
             }
         };
-        let (writer, asker) = (self.writer.guid(), call.asker.prefix);
-        let matched = self
-            .writer
-            .matches()
-            .wait(|matches| matches.of(writer).iter().any(|reader| reader.prefix == asker));
+        let writer = self.writer.guid();
+        let matched = self.writer.matches().wait(|matches| {
+            matches.of(writer).iter().any(|reader| call.is_from_participant_of(reader))
+        });
         // An asker that has gone meanwhile is nothing to complain about.
         let _ = tokio::time::timeout(CLIENT_WAIT, matched).await;
         self.send(&payload, call.id);
