@@ -151,7 +151,12 @@ impl Desk {
         let sensor = self.params.planner.sensor();
         let obstacle = obstacle(&self.space, &self.params);
         let mut found: Vec<Reached> = Vec::new();
+        let on_table = self.params.planner.support == Support::Table;
         let mut reach = |view: &Pose| -> std::result::Result<ReachedView, String> {
+            if on_table && view.translation.z <= 0.0 {
+                // It reaches farther than the region of interest, where the space could say so.
+                return Err("the table hides the object from below".to_owned());
+            }
             let request = ReachRequest {
                 view: *view,
                 start: &start,

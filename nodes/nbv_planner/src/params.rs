@@ -25,8 +25,8 @@ puffer_core::params! {
         radius: f64 = 0.15, in [0.01, 10.0], unit "m";
         /// Height of the region of interest above the object frame's origin.
         height: f64 = 0.3, in [0.01, 10.0], unit "m";
-        /// Depth of the region of interest below the object frame's origin.
-        depth: f64 = 0.0, in [0.0, 10.0], unit "m";
+        /// Depth of the region of interest below the object frame's origin: what holds the object must be in it.
+        depth: f64 = 0.03, in [0.0, 10.0], unit "m";
         /// How far the distance from sensor to object may differ from the working distance, as a share of it.
         distance_share: f64 = 0.15, in [0.0, 0.9];
         /// Air kept between bodies.

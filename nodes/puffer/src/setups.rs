@@ -49,6 +49,7 @@ pub(crate) fn settings(setup: &str) -> Option<Vec<Setting>> {
             all(&SCAN, "scan.pose_rotation", json!(0.0069)),
             all(&SCAN, "scan.body_margin", json!(0.005)),
             all(&["nbv_planner"], "planner.sensor", json!("stereo")),
+            all(&["nbv_planner"], "planner.depth", json!(0.08)),
             all(&["modeller"], "modeller.sensor", json!("stereo")),
             all(&["mock_driver"], "driver.setup", json!("omnirob_stereo")),
         ]
