@@ -76,6 +76,32 @@ pub(crate) fn carve(
     Carved { hits, hit, freed, passed, behind }
 }
 
+/// Adds what rays say that ended beyond the object, on `beyond`: nothing stood before their ends.
+pub(crate) fn see_past(grid: &BlockGrid<Cell>, beyond: &Scan, pose: &Pose, carved: &mut Carved) {
+    let indices: Vec<usize> = beyond.returns().collect();
+    let empty = || SlotSet::new(grid.slots());
+    let batch = |indices: &[usize]| {
+        let mut freed = empty();
+        for ray in indices.iter().filter_map(|&index| ray(beyond, pose, index)) {
+            // The end itself is somebody else's surface.
+            let clear = ray.length - CLEAR * grid.edge();
+            for step in grid.walk(&ray.origin, &ray.direction, 0.0, clear.max(0.0)) {
+                if step.leave <= clear {
+                    freed.insert(step.slot);
+                }
+            }
+        }
+        freed
+    };
+    let unite = |mut a: SlotSet, b: SlotSet| {
+        a.unite(&b);
+        a
+    };
+    let freed = indices.par_chunks(BATCH).map(batch).reduce(empty, unite);
+    carved.freed.unite(&freed);
+    carved.passed.unite(&freed);
+}
+
 /// The eighth of a voxel (slot * 8 + part) in which each point lies and the point's index, sorted; points
 /// outside the grid or in solid space are left out.
 fn ends(grid: &BlockGrid<Cell>, scan: &Scan, pose: &Pose) -> Vec<(u64, u32)> {

@@ -1,7 +1,7 @@
 //! What is known of each voxel.
 
 use super::ViewParams;
-use super::carve::{Carved, carve};
+use super::carve::{Carved, carve, see_past};
 use super::look::{Eye, look};
 use crate::geometry::{Aabb, Pose, Scan, SensorModel, Vec3};
 use crate::voxel::{BlockGrid, SlotSet};
@@ -119,8 +119,24 @@ impl ViewSpace {
     /// # Errors
     /// [`Error::Input`] if the pose is not finite or the scan's vectors differ in length.
     pub fn integrate(&mut self, scan: &Scan, object_from_sensor: &Pose) -> Result<()> {
+        self.integrate_with(scan, &Scan::default(), object_from_sensor)
+    }
+
+    /// As [`ViewSpace::integrate`], with returns of the same scan that lie beyond the object, on robot, table or
+    /// background: they say only that nothing stands before them.
+    ///
+    /// # Errors
+    /// As [`ViewSpace::integrate`].
+    pub fn integrate_with(
+        &mut self,
+        scan: &Scan,
+        beyond: &Scan,
+        object_from_sensor: &Pose,
+    ) -> Result<()> {
         check(scan, object_from_sensor)?;
-        let carved = carve(&self.grid, scan, object_from_sensor, self.params.min_support);
+        check(beyond, object_from_sensor)?;
+        let mut carved = carve(&self.grid, scan, object_from_sensor, self.params.min_support);
+        see_past(&self.grid, beyond, object_from_sensor, &mut carved);
         self.apply(&carved);
         self.judge();
         self.scans += 1;

@@ -33,6 +33,7 @@ pub(crate) struct Desk {
 
 struct Held {
     scan: Scan,
+    beyond: Scan,
     pose: Pose,
     status: Status,
 }
@@ -108,12 +109,13 @@ impl Desk {
     pub(crate) fn take(&mut self, message: &RegisteredScan) -> Result<()> {
         let held = Held {
             scan: scan_from_message(&message.cloud).map_err(anyhow::Error::msg)?,
+            beyond: scan_from_message(&message.beyond).map_err(anyhow::Error::msg)?,
             pose: pose_from_message(&message.object_from_sensor.pose)
                 .map_err(anyhow::Error::msg)?,
             status: status_from_message(message.status).map_err(anyhow::Error::msg)?,
         };
         if held.status == Status::Accepted && !self.scans.contains_key(&message.id) && !self.stale {
-            self.space.integrate(&held.scan, &held.pose)?;
+            self.space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
         } else if held.status == Status::Accepted {
             self.stale = true;
         } else {
@@ -197,7 +199,7 @@ impl Desk {
         let mut space = empty_space(&self.params, robot)?;
         for held in self.scans.values() {
             if held.status == Status::Accepted {
-                space.integrate(&held.scan, &held.pose)?;
+                space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
             } else {
                 space.mark_used(&held.pose);
             }

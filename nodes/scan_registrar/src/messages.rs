@@ -23,6 +23,7 @@ pub(crate) fn scan(id: usize, scan: &Registered, object: &str, sensor: &str) -> 
         header: header(scan.stamp, object),
         id: id as u32,
         cloud: scan_message(scan.scan, header(scan.stamp, sensor)),
+        beyond: scan_message(scan.beyond, header(scan.stamp, sensor)),
         object_from_sensor: pose_with_covariance(&scan.pose, &covariance),
         prior: pose_message(&scan.prior),
         status: status_message(scan.status()),

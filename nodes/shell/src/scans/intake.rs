@@ -1,6 +1,7 @@
 //! All scans that came, registered.
 
-use super::{Observation, RegistrarParams};
+use super::RegistrarParams;
+use super::observation::{Cut, Observation};
 use crate::Stamp;
 use puffer_core::geometry::{Pose, Scan};
 use puffer_core::register::{PreparedScan, Registrar, Registration, Status, Verdict};
@@ -17,8 +18,8 @@ pub struct Intake {
 /// One scan.
 struct Entry {
     observation: Observation,
-    /// What counts as the object, at the pose known last.
-    scan: Scan,
+    /// What counts as the object, at the pose known last, and what does not.
+    cut: Cut,
     /// Its number in the registrar, or why it has none.
     place: std::result::Result<usize, String>,
 }
@@ -29,6 +30,8 @@ pub struct Registered<'a> {
     pub stamp: Stamp,
     /// What counts as the object, sensor frame.
     pub scan: &'a Scan,
+    /// Some of what does not, sensor frame.
+    pub beyond: &'a Scan,
     /// What the robot said.
     pub prior: Pose,
     /// Estimated `object_from_sensor`.
@@ -66,8 +69,8 @@ impl Intake {
     /// Takes a scan; the numbers of those whose pose or verdict is new, this one first.
     pub fn add(&mut self, observation: Observation) -> Vec<usize> {
         let id = self.entries.len();
-        let scan = observation.before_registration(&self.params.scan);
-        let prepared = PreparedScan::new(&scan);
+        let cut = observation.before_registration(&self.params.scan);
+        let prepared = PreparedScan::new(&cut.object);
         let place = match &prepared {
             Ok(prepared) if prepared.points.len() >= LEAST_POINTS => Ok(self.registrar.len()),
             Ok(prepared) => Err(format!(
@@ -77,7 +80,7 @@ impl Intake {
             Err(error) => Err(error.to_string()),
         };
         let good = place.is_ok();
-        self.entries.push(Entry { observation, scan, place });
+        self.entries.push(Entry { observation, cut, place });
         let (Ok(prepared), true) = (prepared, good) else { return vec![id] };
         let changed = self.registrar.add(&prepared, &self.entries[id].observation.prior);
         let ids: Vec<usize> = changed.into_iter().filter_map(|place| self.id_of(place)).collect();
@@ -90,7 +93,7 @@ impl Intake {
     /// Counts a scan that cannot be used, and why; its number.
     pub fn add_unusable(&mut self, stamp: Stamp, reason: String) -> usize {
         let observation = Observation::nothing(stamp);
-        self.entries.push(Entry { observation, scan: Scan::default(), place: Err(reason) });
+        self.entries.push(Entry { observation, cut: Cut::default(), place: Err(reason) });
         self.entries.len() - 1
     }
 
@@ -101,10 +104,10 @@ impl Intake {
         if self.registrar.verdict(place).status != Status::Accepted {
             return;
         }
-        let scan = entry.observation.at(&self.registrar.pose(place), &self.params.scan);
-        if let Ok(prepared) = PreparedScan::new(&scan) {
+        let cut = entry.observation.at(&self.registrar.pose(place), &self.params.scan);
+        if let Ok(prepared) = PreparedScan::new(&cut.object) {
             self.registrar.replace(place, &prepared);
-            entry.scan = scan;
+            entry.cut = cut;
         }
     }
 
@@ -124,7 +127,8 @@ impl Intake {
             Err(reason) => (observation.prior, None, reason.as_str()),
         };
         let (stamp, prior) = (observation.stamp, observation.prior);
-        Registered { stamp, scan: &entry.scan, prior, pose, verdict, reason }
+        let Cut { object, beyond } = &entry.cut;
+        Registered { stamp, scan: object, beyond, prior, pose, verdict, reason }
     }
 
     /// The numbers of the scans that can be registered, in the order of [`Intake::refine`]'s lists.
@@ -136,7 +140,7 @@ impl Intake {
     pub fn views(&self) -> Vec<View> {
         let view = |id: usize| View {
             name: format!("view_{id:03}"),
-            scan: self.entries[id].scan.clone(),
+            scan: self.entries[id].cut.object.clone(),
             object_from_sensor: self.entries[id].observation.prior,
         };
         self.usable().into_iter().map(view).collect()

@@ -6,6 +6,7 @@ use crate::{Stamp, TfBuffer};
 use nalgebra::Point3;
 use puffer_core::geometry::{Pose, Scan, Shape, Vec3};
 use puffer_core::robot::{BodyFilter, RobotModel};
+use puffer_core::voxel::CellIndex;
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
 
 /// How many standard deviations of the robot's pose are added to the margin before a scan is registered.
@@ -17,6 +18,8 @@ pub struct Observation {
     pub stamp: Stamp,
     /// Returns within the region of interest, sensor frame.
     scan: Scan,
+    /// Some of those outside.
+    outside: Scan,
     /// The robot's `object_from_sensor`.
     pub prior: Pose,
     /// Bodies of robot, gripper and table, each with its pose `object_from_shape`.
@@ -53,21 +56,21 @@ impl Observation {
             p.xy().norm() <= params.radius && (-params.depth..=params.height).contains(&p.z)
         };
         // The region is for the eye: the pose error does not matter to it.
-        let kept: Vec<usize> = scan
-            .returns()
-            .filter(|&i| scan.point(i).is_some_and(|p| inside(&(prior * Point3::from(p)).coords)))
-            .collect();
-        Ok(Observation { stamp, scan: select(&scan, &kept), prior, bodies })
+        let (kept, rest): (Vec<usize>, Vec<usize>) = scan.returns().partition(|&i| {
+            scan.point(i).is_some_and(|p| inside(&(prior * Point3::from(p)).coords))
+        });
+        let (inside, outside) = (select(&scan, &kept), thinned(&select(&scan, &rest)));
+        Ok(Observation { stamp, scan: inside, outside, prior, bodies })
     }
 
     /// In place of a scan that cannot be used.
     pub(super) fn nothing(stamp: Stamp) -> Observation {
-        let (scan, prior, bodies) = (Scan::default(), Pose::identity(), Vec::new());
-        Observation { stamp, scan, prior, bodies }
+        let (prior, bodies) = (Pose::identity(), Vec::new());
+        Observation { stamp, scan: Scan::default(), outside: Scan::default(), prior, bodies }
     }
 
     /// The points that surely are not on a body while the pose is only what the robot says.
-    pub(super) fn before_registration(&self, params: &ScanParams) -> Scan {
+    pub(super) fn before_registration(&self, params: &ScanParams) -> Cut {
         let sigma = params.pose_sigma();
         let distance = self.prior.translation.vector.norm();
         let margin =
@@ -76,23 +79,44 @@ impl Observation {
     }
 
     /// The points that are not on a body when the sensor stood at `object_from_sensor`.
-    pub(super) fn at(&self, object_from_sensor: &Pose, params: &ScanParams) -> Scan {
+    pub(super) fn at(&self, object_from_sensor: &Pose, params: &ScanParams) -> Cut {
         self.cut(object_from_sensor, params.body_margin)
     }
 
-    fn cut(&self, object_from_sensor: &Pose, margin: f64) -> Scan {
-        if self.bodies.is_empty() {
-            return self.scan.clone();
-        }
+    fn cut(&self, object_from_sensor: &Pose, margin: f64) -> Cut {
         let sensor_from_object = object_from_sensor.inverse();
         let placed: Vec<(Shape, Pose)> =
             self.bodies.iter().map(|(shape, pose)| (*shape, sensor_from_object * pose)).collect();
         let points: Vec<Vec3> =
             self.scan.points.iter().map(|p| Vec3::from(p.map(f64::from))).collect();
         let on_body = BodyFilter::new(&placed, margin).on_body(&points);
-        let kept: Vec<usize> = (0..points.len()).filter(|&i| !on_body[i]).collect();
-        select(&self.scan, &kept)
+        let (cut, kept): (Vec<usize>, Vec<usize>) = (0..points.len()).partition(|&i| on_body[i]);
+        let mut beyond = thinned(&select(&self.scan, &cut));
+        beyond.points.extend_from_slice(&self.outside.points);
+        beyond.origins.extend_from_slice(&self.outside.origins);
+        Cut { object: select(&self.scan, &kept), beyond }
     }
+}
+
+/// A scan divided.
+#[derive(Clone, Default)]
+pub(super) struct Cut {
+    /// What may be the object.
+    pub object: Scan,
+    /// Some of the rest: nothing stands before it.
+    pub beyond: Scan,
+}
+
+/// Edge of the cells of which one point is kept of what lies beyond the object, metres: enough to see free space.
+const THINNED: f64 = 0.005;
+
+/// One point a cell, the first.
+fn thinned(scan: &Scan) -> Scan {
+    let points: Vec<Vec3> = scan.points.iter().map(|p| Vec3::from(p.map(f64::from))).collect();
+    let cells = CellIndex::new(&points, THINNED);
+    let first = |cell: &[i32; 3]| cells.points_in(*cell).first().map(|&i| i as usize);
+    let kept: Vec<usize> = cells.cells().iter().filter_map(first).collect();
+    select(scan, &kept)
 }
 
 /// The points at `indices`, no longer in rows.
