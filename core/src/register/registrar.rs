@@ -80,12 +80,6 @@ impl Registrar {
         changed
     }
 
-    /// Puts other points of the same scan in place of those of scan `index`, for when all scans are refined: once its
-    /// pose is known, more can be said about which points are the object's.
-    pub fn replace(&mut self, index: usize, scan: &PreparedScan) {
-        self.samples[index] = Sample::new(scan, self.params.samples);
-    }
-
     /// Tries all that were put aside until none can be placed.
     fn retry(&mut self) -> Vec<usize> {
         let mut placed = Vec::new();
@@ -128,6 +122,15 @@ impl Registrar {
             &self.params,
             progress,
         )?;
+        self.adopt(&registration);
+        Ok(registration)
+    }
+
+    /// Goes on from a registration of all scans taken; one of another number of scans is passed over.
+    pub fn adopt(&mut self, registration: &Registration) {
+        if registration.poses.len() != self.samples.len() || self.samples.is_empty() {
+            return;
+        }
         self.poses.clone_from(&registration.poses);
         self.verdicts.clone_from(&registration.verdicts);
         let mut map = Map::new(self.samples[0].target_spacing);
@@ -137,6 +140,5 @@ impl Registrar {
             }
         }
         self.map = Some(map);
-        Ok(registration)
     }
 }

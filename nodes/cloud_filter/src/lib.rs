@@ -94,19 +94,20 @@ async fn wait_for(
 ) -> std::result::Result<(), String> {
     let since = Instant::now();
     loop {
-        let (scans, revision) = {
+        let (scans, revision, complete) = {
             let store = store.lock().await;
-            (store.len(), store.revision)
+            (store.len(), store.revision, store.is_complete())
         };
-        if scans >= request.scans as usize && revision >= request.revision {
+        if scans >= request.scans as usize && revision >= request.revision && complete {
             return Ok(());
         }
         if since.elapsed() > INPUT_DEADLINE {
             return Err(format!(
-                "{scans} of {} scans and revision {revision} of {} of the poses came within {} s",
+                "{scans} of {} scans and revision {revision} of {} of the poses came within {} s{}",
                 request.scans,
                 request.revision,
-                INPUT_DEADLINE.as_secs()
+                INPUT_DEADLINE.as_secs(),
+                if complete { "" } else { ", but not the points that go with these poses" }
             ));
         }
         tokio::time::sleep(Duration::from_millis(20)).await;

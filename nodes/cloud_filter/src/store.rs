@@ -15,6 +15,8 @@ pub(crate) struct Store {
     /// That of the newest corrected poses, 0 before the first.
     pub revision: u32,
     residual: Option<f64>,
+    /// The newest corrected poses.
+    poses: Option<RegisteredPoses>,
 }
 
 struct Held {
@@ -22,6 +24,7 @@ struct Held {
     scan: Option<PreparedScan>,
     pose: Pose,
     status: Status,
+    version: u32,
 }
 
 impl Store {
@@ -41,6 +44,7 @@ impl Store {
             scan: PreparedScan::new(&scan).ok(),
             pose: pose_from_message(&message.object_from_sensor.pose)?,
             status: status_from_message(message.status)?,
+            version: message.version,
         };
         self.scans.insert(message.id, held);
         Ok(())
@@ -59,14 +63,40 @@ impl Store {
                 message.object_from_sensor.len()
             ));
         }
-        for (i, id) in message.ids.iter().enumerate() {
-            if let Some(held) = self.scans.get_mut(id) {
-                held.pose = pose_from_message(&message.object_from_sensor[i].pose)?;
-                held.status = status_from_message(message.status[i])?;
-            }
+        for i in 0..count {
+            pose_from_message(&message.object_from_sensor[i].pose)?;
+            status_from_message(message.status[i])?;
         }
         (self.revision, self.residual) = (message.revision, Some(message.residual));
+        self.poses = Some(message.clone());
         Ok(())
+    }
+
+    /// Whether the scans that the corrected poses go with have come.
+    pub(crate) fn is_complete(&self) -> bool {
+        let Some(poses) = &self.poses else { return true };
+        poses
+            .ids
+            .iter()
+            .zip(&poses.versions)
+            .all(|(id, version)| self.scans.get(id).is_some_and(|held| held.version >= *version))
+    }
+
+    /// Puts the corrected poses in place of the scans' own.
+    fn corrected(&self) -> Vec<(Pose, Status, Option<&PreparedScan>)> {
+        let correction = |id: &u32| {
+            let poses = self.poses.as_ref()?;
+            let i = poses.ids.iter().position(|other| other == id)?;
+            let pose = pose_from_message(&poses.object_from_sensor[i].pose).ok()?;
+            Some((pose, status_from_message(poses.status[i]).ok()?))
+        };
+        self.scans
+            .iter()
+            .map(|(id, held)| {
+                let (pose, status) = correction(id).unwrap_or((held.pose, held.status));
+                (pose, status, held.scan.as_ref())
+            })
+            .collect()
     }
 
     /// Combines the accepted scans.
@@ -75,10 +105,10 @@ impl Store {
     /// As [`filter`].
     pub(crate) fn filter(&self, params: &FilterParams) -> puffer_core::Result<Filtered> {
         let accepted: Vec<(&PreparedScan, Pose)> = self
-            .scans
-            .values()
-            .filter(|held| held.status == Status::Accepted)
-            .filter_map(|held| Some((held.scan.as_ref()?, held.pose)))
+            .corrected()
+            .into_iter()
+            .filter(|(_, status, _)| *status == Status::Accepted)
+            .filter_map(|(pose, _, scan)| Some((scan?, pose)))
             .collect();
         if accepted.is_empty() {
             return Err(Error::input(format!(

@@ -34,11 +34,12 @@ const SCANS_HELD: usize = 4;
 pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let node: Node<Params> = Node::start("scan_registrar", args, stop.clone()).await?;
     let points: BulkSubscription<PointCloud2> = node.bulk_subscribe("points", Delivery::Every)?;
-    let scans = node.bulk_publisher("registered_scan", Mode::Queue { depth: SCANS_HELD })?;
+    let scans =
+        Arc::new(node.bulk_publisher("registered_scan", Mode::Queue { depth: SCANS_HELD })?);
     let descriptions = node.subscribe("robot_description", Profile::LatchedSub)?;
     let tf = node.tf()?;
     let intake = Arc::new(Mutex::new(Intake::new(node.params())));
-    refine::serve(&node, &intake)?;
+    refine::serve(&node, &intake, &scans)?;
     serve_reset(&node, &intake)?;
     let mut desk = Desk { node: node.clone(), intake, scans, robot: None, descriptions, tf };
     tracing::info!("ready");
@@ -55,7 +56,7 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
 struct Desk {
     node: Node<Params>,
     intake: Arc<Mutex<Intake>>,
-    scans: BulkPublisher,
+    scans: Arc<BulkPublisher>,
     robot: Option<RobotModel>,
     descriptions: Subscription<Text>,
     tf: TfBuffer,

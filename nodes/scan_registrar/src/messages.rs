@@ -22,6 +22,7 @@ pub(crate) fn scan(id: usize, scan: &Registered, object: &str, sensor: &str) -> 
     RegisteredScan {
         header: header(scan.stamp, object),
         id: id as u32,
+        version: scan.version,
         cloud: scan_message(scan.scan, header(scan.stamp, sensor)),
         beyond: scan_message(scan.beyond, header(scan.stamp, sensor)),
         object_from_sensor: pose_with_covariance(&scan.pose, &covariance),
@@ -49,6 +50,7 @@ pub(crate) fn poses(
         header: header(stamp, object),
         revision,
         ids: intake.usable().iter().map(|&id| id as u32).collect(),
+        versions: intake.usable().iter().map(|&id| intake.scan(id).version).collect(),
         status: verdicts.iter().map(|v| status_message(v.status)).collect(),
         object_from_sensor: registration
             .poses

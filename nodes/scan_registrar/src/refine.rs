@@ -3,8 +3,10 @@
 use crate::{Params, messages};
 use anyhow::Result;
 use puffer_core::register::Status;
+use puffer_core::robot::SENSOR_FRAME;
 use puffer_core::{Error, Progress};
 use puffer_msgs::action::{Refine, RefineFeedback, RefineGoal, RefineResult};
+use puffer_msgs::msg::RegisteredScan;
 use puffer_shell::bulk::{BulkPublisher, Mode};
 use puffer_shell::scans::Intake;
 use puffer_shell::{Goal, Node, Outcome};
@@ -19,11 +21,16 @@ const SCANS_DEADLINE: Duration = Duration::from_secs(30);
 const FLUSH_DEADLINE: Duration = Duration::from_secs(10);
 
 /// Offers `~/refine` and publishes `registered_poses`.
-pub(crate) fn serve(node: &Node<Params>, intake: &Arc<Mutex<Intake>>) -> Result<()> {
+pub(crate) fn serve(
+    node: &Node<Params>,
+    intake: &Arc<Mutex<Intake>>,
+    scans: &Arc<BulkPublisher>,
+) -> Result<()> {
     let desk = Arc::new(Desk {
         node: node.clone(),
         intake: Arc::clone(intake),
         poses: node.bulk_publisher("registered_poses", Mode::Latched)?,
+        scans: Arc::clone(scans),
         revision: AtomicU32::new(0),
     });
     node.action_server::<Refine, _, _, _>(
@@ -40,6 +47,7 @@ struct Desk {
     node: Node<Params>,
     intake: Arc<Mutex<Intake>>,
     poses: BulkPublisher,
+    scans: Arc<BulkPublisher>,
     revision: AtomicU32,
 }
 
@@ -76,7 +84,18 @@ impl Desk {
         let revision = self.revision.fetch_add(1, Ordering::Relaxed) + 1;
         let object = self.node.params().scan.object_frame;
         let message = messages::poses(&intake, &registration, revision, self.node.now(), &object);
+        // Their points have changed with the poses.
+        let scans: Vec<RegisteredScan> = intake
+            .usable()
+            .into_iter()
+            .map(|id| messages::scan(id, &intake.scan(id), &object, SENSOR_FRAME))
+            .collect();
         drop(intake);
+        for scan in &scans {
+            if let Err(error) = self.scans.publish_message(scan).await {
+                return failed(RefineResult::FAILED, error.to_string());
+            }
+        }
         if let Err(error) = self.poses.publish_message(&message).await {
             return failed(RefineResult::FAILED, error.to_string());
         }

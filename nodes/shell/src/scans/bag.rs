@@ -76,6 +76,9 @@ pub fn scans_of_bag(path: &Path, params: &RegistrarParams, progress: &Progress) 
         intake.add(observation);
     }
     progress.report("read", 1.0)?;
+    if !intake.usable().is_empty() {
+        intake.settle(progress)?;
+    }
     let views = intake.views();
     if views.is_empty() {
         bail!("{}: none of its {} scans shows anything of the object", name(), intake.len());

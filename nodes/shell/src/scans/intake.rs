@@ -4,7 +4,7 @@ use super::RegistrarParams;
 use super::observation::{Cut, Observation};
 use crate::Stamp;
 use puffer_core::geometry::{Pose, Scan};
-use puffer_core::register::{PreparedScan, Registrar, Registration, Status, Verdict};
+use puffer_core::register::{PreparedScan, Registrar, Registration, Status, Verdict, register};
 use puffer_core::scans::View;
 use puffer_core::{Progress, Result};
 
@@ -22,10 +22,13 @@ struct Entry {
     cut: Cut,
     /// Its number in the registrar, or why it has none.
     place: std::result::Result<usize, String>,
+    version: u32,
 }
 
 /// A scan as it stands.
 pub struct Registered<'a> {
+    /// How often something new was said of it.
+    pub version: u32,
     /// When it was taken.
     pub stamp: Stamp,
     /// What counts as the object, sensor frame.
@@ -80,12 +83,13 @@ impl Intake {
             Err(error) => Err(error.to_string()),
         };
         let good = place.is_ok();
-        self.entries.push(Entry { observation, cut, place });
+        self.entries.push(Entry { observation, cut, place, version: 1 });
         let (Ok(prepared), true) = (prepared, good) else { return vec![id] };
         let changed = self.registrar.add(&prepared, &self.entries[id].observation.prior);
         let ids: Vec<usize> = changed.into_iter().filter_map(|place| self.id_of(place)).collect();
         for &id in &ids {
             self.cut_again(id);
+            self.entries[id].version += u32::from(id != ids[0]);
         }
         ids
     }
@@ -93,7 +97,8 @@ impl Intake {
     /// Counts a scan that cannot be used, and why; its number.
     pub fn add_unusable(&mut self, stamp: Stamp, reason: String) -> usize {
         let observation = Observation::nothing(stamp);
-        self.entries.push(Entry { observation, cut: Cut::default(), place: Err(reason) });
+        let (cut, place) = (Cut::default(), Err(reason));
+        self.entries.push(Entry { observation, cut, place, version: 1 });
         self.entries.len() - 1
     }
 
@@ -104,11 +109,7 @@ impl Intake {
         if self.registrar.verdict(place).status != Status::Accepted {
             return;
         }
-        let cut = entry.observation.at(&self.registrar.pose(place), &self.params.scan);
-        if let Ok(prepared) = PreparedScan::new(&cut.object) {
-            self.registrar.replace(place, &prepared);
-            entry.cut = cut;
-        }
+        entry.cut = entry.observation.at(&self.registrar.pose(place), &self.params.scan);
     }
 
     fn id_of(&self, place: usize) -> Option<usize> {
@@ -128,7 +129,8 @@ impl Intake {
         };
         let (stamp, prior) = (observation.stamp, observation.prior);
         let Cut { object, beyond } = &entry.cut;
-        Registered { stamp, scan: object, beyond, prior, pose, verdict, reason }
+        let version = entry.version;
+        Registered { version, stamp, scan: object, beyond, prior, pose, verdict, reason }
     }
 
     /// The numbers of the scans that can be registered, in the order of [`Intake::refine`]'s lists.
@@ -146,12 +148,35 @@ impl Intake {
         self.usable().into_iter().map(view).collect()
     }
 
-    /// Optimises the poses of all usable scans together.
+    /// Registers all usable scans together and cuts each again at its pose: in all poses together the robot's errors
+    /// have averaged out, so that only now the bodies stand where they are.
     ///
     /// # Errors
-    /// As [`puffer_core::register::register`].
+    /// As [`register`].
+    pub fn settle(&mut self, progress: &Progress) -> Result<()> {
+        self.registrar.refine(progress)?;
+        for id in self.usable() {
+            self.cut_again(id);
+            self.entries[id].version += 1;
+        }
+        Ok(())
+    }
+
+    /// Settles, and optimises the poses of all usable scans once more with the points that are left: exactly what is
+    /// made of a scan folder with [`Intake::views`].
+    ///
+    /// # Errors
+    /// As [`register`].
     pub fn refine(&mut self, progress: &Progress) -> Result<Registration> {
-        self.registrar.refine(progress)
+        self.settle(progress)?;
+        let views = self.views();
+        let scans: Vec<PreparedScan> =
+            views.iter().map(|view| PreparedScan::new(&view.scan)).collect::<Result<_>>()?;
+        let robot: Vec<Pose> = views.iter().map(|view| view.object_from_sensor).collect();
+        let sigma = Some(self.params.scan.pose_sigma());
+        let registration = register(&scans, &robot, sigma, &self.params.register, progress)?;
+        self.registrar.adopt(&registration);
+        Ok(registration)
     }
 }
 
