@@ -5,6 +5,7 @@ use super::{PoseSigma, SensorKind, Support, Unit};
 use crate::geometry::{Pose, pose_from_rows, pose_to_rows};
 use crate::params::ParamValue;
 use crate::{Error, Result};
+use nalgebra::{Quaternion, UnitQuaternion};
 use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::path::Path;
@@ -13,6 +14,10 @@ use std::path::Path;
 pub(super) const FORMAT: &str = "puffer-scans-1";
 /// Value of the key `cloud_frame` where the clouds are Stanford's range grids.
 pub(super) const RANGE_GRID: &str = "range_grid";
+/// Key of a view's rotation as x y z w, beside the matrix: it brings the pose back bit by bit, which a matrix does not.
+pub(super) const QUATERNION: &str = "quaternion";
+/// Largest angle, radians, between a quaternion and the matrix beside it that is left to rounding.
+const SAME_ROTATION: f64 = 1e-9;
 /// Farthest that a sensor is believed to be from the object frame, metres: poses in millimetres lie beyond.
 const FARTHEST: f64 = 100.0;
 
@@ -89,6 +94,7 @@ fn entry(view: &Value, unit: Unit) -> std::result::Result<Entry, String> {
         .ok_or_else(|| String::from(": lacks \"cloud\", the name of its PLY file"))?;
     let object_from_sensor = pose(&view["object_from_sensor"], unit)
         .map_err(|message| format!(" ({cloud}): {message}"))?;
+    let object_from_sensor = exact(object_from_sensor, &view[QUATERNION]);
     let width = view["width"].as_u64().and_then(|w| usize::try_from(w).ok()).unwrap_or(0);
     let name = view_name(cloud);
     Ok(Entry { name, cloud: cloud.to_owned(), width, object_from_sensor })
@@ -115,6 +121,23 @@ fn pose(value: &Value, unit: Unit) -> std::result::Result<Pose, String> {
         ));
     }
     Ok(pose)
+}
+
+/// The pose with the rotation `quaternion` if that is the same one; a matrix that somebody changed counts.
+fn exact(pose: Pose, quaternion: &Value) -> Pose {
+    let Ok([x, y, z, w]) = serde_json::from_value::<[f64; 4]>(quaternion.clone()) else {
+        return pose;
+    };
+    let quaternion = Quaternion::new(w, x, y, z);
+    if !((quaternion.norm() - 1.0).abs() < SAME_ROTATION) {
+        return pose;
+    }
+    let rotation = UnitQuaternion::new_unchecked(quaternion);
+    if pose.rotation.angle_to(&rotation) < SAME_ROTATION {
+        Pose::from_parts(pose.translation, rotation)
+    } else {
+        pose
+    }
 }
 
 fn frame(document: &Value) -> std::result::Result<Frame, String> {
@@ -163,7 +186,13 @@ fn pose_sigma(document: &Value, unit: Unit) -> std::result::Result<Option<PoseSi
     Ok(Some(PoseSigma { translation, rotation: number("rotation")? }))
 }
 
-/// A pose as it stands in a document whose lengths are in `unit`.
+/// A pose as the keys of a view, in a document whose lengths are in `unit`.
+pub(super) fn pose_keys(pose: &Pose, unit: Unit) -> Value {
+    let q = pose.rotation.quaternion();
+    json!({"object_from_sensor": matrix(pose, unit), QUATERNION: [q.i, q.j, q.k, q.w]})
+}
+
+/// A pose as a matrix in a document whose lengths are in `unit`.
 pub(super) fn matrix(pose: &Pose, unit: Unit) -> Value {
     let mut rows = pose_to_rows(pose);
     for row in rows.iter_mut().take(3) {

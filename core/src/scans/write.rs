@@ -1,6 +1,6 @@
 //! Writing of scan folders and of corrected poses.
 
-use super::document::{FORMAT, matrix};
+use super::document::{FORMAT, pose_keys};
 use super::source::read_document;
 use super::{PoseSigma, ScanSet, ScanSource, SensorKind, Support, Unit, View, cloud};
 use crate::geometry::{Pose, Scan};
@@ -110,7 +110,11 @@ fn new_document(head: &Head, entries: &[(String, Pose)], extras: &[Value]) -> Va
     if head.support != Support::None {
         document.insert("support".into(), head.support.to_value());
     }
-    let entry = |(file, pose): &(String, Pose)| json!({"cloud": file, "object_from_sensor": matrix(pose, Unit::M)});
+    let entry = |(file, pose): &(String, Pose)| {
+        let mut view = json!({"cloud": file});
+        add(&mut view, &pose_keys(pose, Unit::M));
+        view
+    };
     let mut views: Vec<Value> = entries.iter().map(entry).collect();
     for (view, extra) in views.iter_mut().zip(extras) {
         add(view, extra);
@@ -156,7 +160,7 @@ pub fn write_poses(
     let views = document.get_mut("views").and_then(Value::as_array_mut);
     let views = views.map_or(&mut [][..], Vec::as_mut_slice);
     for (view, pose) in views.iter_mut().zip(poses) {
-        add(view, &json!({"object_from_sensor": matrix(pose, unit)}));
+        add(view, &pose_keys(pose, unit));
     }
     for (view, extra) in views.iter_mut().zip(extras) {
         add(view, extra);

@@ -25,6 +25,9 @@ use tokio::sync::Mutex;
 /// How long a goal waits for the cloud that it names.
 const CLOUD_DEADLINE: Duration = Duration::from_secs(30);
 
+/// How long it waits for the readers of the mesh: whoever hears that it is there may end this node.
+const FLUSH_DEADLINE: Duration = Duration::from_secs(5);
+
 /// Everything that a request needs.
 struct Counter {
     node: Node<Params>,
@@ -88,6 +91,8 @@ impl Counter {
         let message = mesh_message(&mesh, Header { stamp: Time { sec, nanosec }, frame_id });
         if let Err(error) = self.meshes.publish_message(&message).await {
             tracing::error!("the mesh is written, but not published: {error}");
+        } else if let Err(error) = self.meshes.flush(FLUSH_DEADLINE).await {
+            tracing::warn!("{error}");
         }
         self.desk.lock().await.mesh = Some(Arc::new(mesh));
         tracing::info!(

@@ -12,6 +12,7 @@ use puffer_msgs::builtin_interfaces::msg::{Duration as DurationMessage, Time};
 use puffer_msgs::msg::ModellingStatus;
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::{Goal, Node, Outcome, Publisher};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
@@ -24,6 +25,8 @@ pub(crate) struct Modeller {
     pub status: Publisher<ModellingStatus>,
     /// Where the running session takes its controls.
     pub controls: Mutex<Option<UnboundedSender<Event>>>,
+    /// Whether scans that were taken before are being made into a mesh.
+    pub finishing: AtomicBool,
 }
 
 impl Modeller {
@@ -33,8 +36,11 @@ impl Modeller {
         controls.as_ref().is_some_and(|sender| sender.send(event).is_ok())
     }
 
-    /// Whether a session is running.
+    /// Whether a session is running, or its last steps alone.
     pub(crate) fn is_busy(&self) -> bool {
+        if self.finishing.load(Ordering::SeqCst) {
+            return true;
+        }
         let controls = self.controls.lock().unwrap_or_else(PoisonError::into_inner);
         controls.as_ref().is_some_and(|sender| !sender.is_closed())
     }

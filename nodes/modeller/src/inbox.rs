@@ -32,6 +32,11 @@ impl Inbox {
         *self.lock() = Held::default();
     }
 
+    /// Number of scans that came.
+    pub(crate) fn len(&self) -> usize {
+        self.lock().scans.len()
+    }
+
     /// Waits for scan `id`; a copy of it without its points.
     pub(crate) async fn wait_for(&self, id: u32, deadline: Duration) -> Result<RegisteredScan> {
         let since = Instant::now();

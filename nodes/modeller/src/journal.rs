@@ -112,7 +112,9 @@ impl Journal {
                 view.insert("verdict".to_owned(), verdict.clone())
             }),
         };
-        if message.cloud.width == 0 {
+        // Without a verdict it is not registered, whoever tries: it has no place among the scans.
+        let judged = message.object_from_sensor.covariance.iter().any(|v| *v != 0.0);
+        if message.cloud.width == 0 || !judged {
             return Ok(());
         }
         if let Some(scans) = &mut self.scans {

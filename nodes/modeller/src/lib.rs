@@ -2,8 +2,10 @@
 //!
 //! The action `model_object` plans a view, moves, scans and waits for the verdict until no view is left, then has all
 //! poses refined, the scans combined and the mesh made. `modelling_status` tells where it stands; `~/pause`,
-//! `~/resume` and the action's cancel steer it. The order itself is [`puffer_core::session`].
+//! `~/resume` and the action's cancel steer it. `~/finish` does the last three steps alone. The order itself is
+//! [`puffer_core::session`].
 
+mod finish;
 mod goal;
 mod inbox;
 mod journal;
@@ -23,6 +25,7 @@ use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::bulk::{BulkSubscription, Delivery};
 use puffer_shell::{Goal, Node, Profile, RosArgs, Stop};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 /// Runs the modeller until `stop`.
@@ -38,9 +41,11 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
         inbox: Arc::new(Inbox::default()),
         status: node.publisher("modelling_status", Profile::Standard)?,
         controls: Mutex::new(None),
+        finishing: AtomicBool::new(false),
         node: node.clone(),
     });
     serve_goals(&node, &modeller)?;
+    finish::serve(&node, &modeller)?;
     serve_control(&node, &modeller, "~/pause", Event::Pause)?;
     serve_control(&node, &modeller, "~/resume", Event::Resume)?;
     tracing::info!("ready");

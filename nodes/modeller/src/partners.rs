@@ -54,17 +54,39 @@ impl Partners {
     /// # Errors
     /// Names those that are missing after the deadline.
     pub(crate) async fn ready(&self) -> Result<()> {
-        let deadline = self.deadline(|p| p.start_deadline);
-        let since = Instant::now();
-        loop {
-            let there = [
+        self.wait_for(|| {
+            let mut all = vec![
                 ("nbv_planner", self.plan.is_ready()),
                 ("the robot's controller (follow_joint_trajectory)", self.drive.is_ready()),
                 ("the sensor (trigger_scan)", self.trigger.is_ready()),
-                ("scan_registrar", self.refine.is_ready()),
-                ("cloud_filter", self.filter.is_ready()),
-                ("mesh_reconstructor", self.reconstruct.is_ready()),
             ];
+            all.extend(self.makers());
+            all
+        })
+        .await
+    }
+
+    /// Waits until those are there that make a mesh of scans that were taken.
+    ///
+    /// # Errors
+    /// Names those that are missing after the deadline.
+    pub(crate) async fn ready_to_finish(&self) -> Result<()> {
+        self.wait_for(|| self.makers().to_vec()).await
+    }
+
+    fn makers(&self) -> [(&'static str, bool); 3] {
+        [
+            ("scan_registrar", self.refine.is_ready()),
+            ("cloud_filter", self.filter.is_ready()),
+            ("mesh_reconstructor", self.reconstruct.is_ready()),
+        ]
+    }
+
+    async fn wait_for(&self, look: impl Fn() -> Vec<(&'static str, bool)>) -> Result<()> {
+        let deadline = self.deadline(|p| p.start_deadline);
+        let since = Instant::now();
+        loop {
+            let there = look();
             let missing: Vec<&str> =
                 there.iter().filter(|(_, ready)| !ready).map(|(name, _)| *name).collect();
             if missing.is_empty() {

@@ -22,7 +22,11 @@ pub struct ParameterArgs {
 impl ParameterArgs {
     /// Defaults, overridden by the file, overridden by the settings.
     pub(crate) fn load(&self) -> Result<Params> {
-        let mut params = Params::default();
+        self.load_onto(Params::default())
+    }
+
+    /// `params`, overridden by the file, overridden by the settings.
+    pub(crate) fn load_onto<P: Parameters>(&self, mut params: P) -> Result<P> {
         if let Some(path) = &self.params {
             let text = std::fs::read_to_string(path)
                 .with_context(|| format!("cannot read the parameter file {}", path.display()))?;

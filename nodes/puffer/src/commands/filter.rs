@@ -1,6 +1,6 @@
 //! `puffer filter`: one cloud with uncertainty.
 
-use super::input::{InputArgs, check_output};
+use super::input::{InputArgs, Job, check_output};
 use crate::parameters::ParameterArgs;
 use crate::progress::Watch;
 use crate::table::Report;
@@ -29,10 +29,10 @@ pub struct Filter {
 
 impl Filter {
     pub(super) fn run(&self) -> Result<()> {
-        let params = self.parameters.load()?;
         check_output(&self.output, &["ply"])?;
-        let input = self.input.open()?;
         let watch = Watch::start();
+        let Job { data: input, params, .. } =
+            self.input.open(&self.parameters, watch.progress())?;
         let filtered =
             self.input.named(filtered(&input, self.input.poses(), &params, watch.progress()))?;
         watch.finish();

@@ -1,5 +1,6 @@
 //! The commands of `puffer`.
 
+pub(crate) mod bag;
 mod bench;
 mod doctor;
 mod evaluate;
@@ -41,6 +42,8 @@ pub enum Command {
     Objects(objects::Objects),
     /// List the parameters with their defaults, ranges and units
     Params(params::Params),
+    /// Record, play and look into bags
+    Bag(bag::Bag),
     /// Measure a part on this machine
     Bench(bench::Bench),
     /// Check this machine
@@ -64,6 +67,7 @@ impl Command {
             Command::Render(command) => command.run(),
             Command::Objects(command) => command.run(),
             Command::Params(command) => command.run(),
+            Command::Bag(command) => command.run(),
             Command::Bench(command) => command.run(),
             Command::Doctor(command) => command.run(),
         }?;

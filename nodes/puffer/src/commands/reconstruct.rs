@@ -1,6 +1,6 @@
 //! `puffer reconstruct`: from scans to a watertight mesh.
 
-use super::input::{InputArgs, check_output};
+use super::input::{InputArgs, Job, check_output};
 use crate::parameters::ParameterArgs;
 use crate::progress::Watch;
 use crate::table::Report;
@@ -23,9 +23,9 @@ pub struct Reconstruct {
     output: PathBuf,
     #[command(flatten)]
     parameters: ParameterArgs,
-    /// Seed for whatever is left to chance
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    /// Seed for whatever is left to chance [default: that of the run that a bag came from, or 0]
+    #[arg(long)]
+    seed: Option<u64>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -33,14 +33,13 @@ pub struct Reconstruct {
 
 impl Reconstruct {
     pub(super) fn run(&self) -> Result<()> {
-        let params = self.parameters.load()?;
         check_output(&self.output, &["ply", "stl", "obj", "glb"])?;
-        let input = self.input.open()?;
         let watch = Watch::start();
+        let Job { data, params, seed } = self.input.open(&self.parameters, watch.progress())?;
         let outcome =
-            self.input.named(run(&input, self.input.poses(), &params, watch.progress()))?;
+            self.input.named(run(&data, self.input.poses(), &params, watch.progress()))?;
         let times = watch.finish();
-        let comments = comments(&outcome.cloud, self.seed);
+        let comments = comments(&outcome.cloud, self.seed.or(seed).unwrap_or(0));
         write_mesh(&self.output, &outcome.mesh, &comments)?;
         self.report(&outcome, &times).print(self.json);
         Ok(())

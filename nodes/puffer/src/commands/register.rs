@@ -1,6 +1,6 @@
 //! `puffer register`: corrected poses and a verdict on each scan.
 
-use super::input::{InputArgs, check_output};
+use super::input::{InputArgs, Job, check_output};
 use crate::parameters::ParameterArgs;
 use crate::progress::Watch;
 use crate::table::Report;
@@ -30,10 +30,10 @@ pub struct Register {
 
 impl Register {
     pub(super) fn run(&self) -> Result<()> {
-        let params = self.parameters.load()?;
         check_output(&self.output, &["json"])?;
-        let files = self.input.open_scans()?;
         let watch = Watch::start();
+        let Job { data: files, params, .. } =
+            self.input.open_scans(&self.parameters, watch.progress())?;
         let prepared = self.input.named(prepare(&files, watch.progress()))?;
         let registration = self.input.named(register_scans(
             &prepared,

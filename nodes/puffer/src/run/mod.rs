@@ -2,6 +2,7 @@
 
 mod folder;
 mod goal;
+mod recorder;
 mod results;
 mod table;
 
@@ -14,8 +15,11 @@ use goal::{Ending, pursue};
 use puffer_core::Error;
 use puffer_core::assess::Assessment;
 use puffer_core::mesh::Mesh;
+use puffer_shell::scans::PARAMETER_NOTE;
 use puffer_shell::{NoParams, Node, RosArgs, Stop};
+use recorder::Recorder;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -120,6 +124,12 @@ impl Run {
             log: self.folder.file("log.txt"),
         };
         eprintln!("run folder {}", self.folder.path().display());
+        // Before those who speak.
+        let recorder = if self.plan.bag {
+            Some(Recorder::start(self.domain, &self.folder.file("bag.mcap"), self.notes()?).await?)
+        } else {
+            None
+        };
         let mut fleet = Fleet::start(&crew, self.plan.one_process)?;
         let roll: Vec<String> =
             fleet.roll().iter().map(|(name, process)| format!("{name} {process}")).collect();
@@ -131,7 +141,27 @@ impl Run {
             ending = pursue(&node, &self.plan.object, &stop) => ending?,
             why = fleet.loss() => Ending::Failed(why),
         };
-        Ok((ending, fleet.stop().await))
+        let mut problems = fleet.stop().await;
+        if let Some(recorder) = recorder {
+            problems.extend(recorder.stop().await.err().map(|error| format!("{error:#}")));
+        }
+        Ok((ending, problems))
+    }
+
+    /// What the bag says beside the messages.
+    fn notes(&self) -> Result<BTreeMap<String, String>> {
+        let seed = self.plan.settings.iter().rev().find(|s| s.name == "driver.seed");
+        let params = self.folder.file("params.yaml");
+        let params = std::fs::read_to_string(&params)
+            .with_context(|| format!("cannot read {}", params.display()))?;
+        let notes = [
+            (PARAMETER_NOTE, params),
+            ("program", format!("puffer {}", env!("CARGO_PKG_VERSION"))),
+            ("setup", self.plan.setup.clone()),
+            ("object", self.plan.object.clone()),
+            ("seed", seed.map_or_else(String::new, |s| s.value.to_string())),
+        ];
+        Ok(notes.map(|(key, text)| (key.to_owned(), text)).into())
     }
 
     /// What the report says beside the modeller's part.
