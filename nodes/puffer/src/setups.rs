@@ -1,7 +1,7 @@
 //! The set-ups: which parameters differ from their defaults, and the parameter file of all nodes.
 
 use crate::failure::usage;
-use crate::nodes::{NODES, find};
+use crate::nodes::{NodeKind, find};
 use anyhow::{Context, Result};
 use puffer_core::params::ParamSpec;
 use puffer_core::robot::SETUPS;
@@ -28,7 +28,7 @@ const SCAN: [&str; 3] = ["scan_registrar", "mesh_reconstructor", "modeller"];
 ///
 /// The standard deviations go with the robots' pose errors (lengths uniform between 0.1 and 0.3 mm and 0.01 and 0.03
 /// degrees; 2 and 5 mm and 0.3 and 1 degree): a third of the mean square for each axis.
-pub(crate) fn settings(setup: &str) -> Option<Vec<Setting>> {
+fn settings(setup: &str) -> Option<Vec<Setting>> {
     Some(match setup {
         "kr16_laser" => [
             all(&SCAN, "scan.pose_translation", json!(0.00012)),
@@ -60,9 +60,27 @@ pub(crate) fn settings(setup: &str) -> Option<Vec<Setting>> {
     })
 }
 
-/// The names of the set-ups.
-pub(crate) fn names() -> String {
-    SETUPS.join(", ")
+/// The settings of a set-up.
+///
+/// # Errors
+/// There is no such: usage.
+pub(crate) fn of(setup: &str) -> Result<Vec<Setting>> {
+    settings(setup).ok_or_else(|| {
+        usage(format!("there is no set-up {setup}; there are {}", SETUPS.join(", ")))
+    })
+}
+
+/// The settings with which all files of a run go to `folder`.
+pub(crate) fn output(folder: &str) -> Vec<Setting> {
+    [
+        all(&["mock_driver"], "driver.truth_folder", folder.into()),
+        all(&["mesh_reconstructor"], "mesh.output_folder", folder.into()),
+        all(&["modeller"], "modeller.run_folder", folder.into()),
+        all(&["modeller"], "modeller.mesh_path", "mesh.ply".into()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// What a parameter allows, in brackets, after its description.
@@ -79,12 +97,26 @@ pub(crate) fn describe(spec: &ParamSpec) -> String {
     format!("{}{range}", spec.description)
 }
 
-/// The ROS parameter file of a set-up: all parameters of all nodes, with `settings` in place of the defaults.
-pub(crate) fn parameter_file(settings: &[Setting]) -> String {
+/// The value that a parameter of a node has with `settings`.
+pub(crate) fn value_of<'a>(spec: &'a ParamSpec, node: &str, settings: &'a [Setting]) -> &'a Value {
+    let set = settings.iter().rev().find(|s| s.node == node && s.name == spec.name);
+    set.map_or(&spec.default, |s| &s.value)
+}
+
+/// The ROS parameter file of nodes: all their parameters, with `settings` in place of the defaults. `simulated` says
+/// where time comes from; without it the file leaves that to whoever starts the nodes.
+pub(crate) fn parameter_file<'a>(
+    nodes: impl IntoIterator<Item = &'a NodeKind>,
+    settings: &[Setting],
+    simulated: Option<bool>,
+) -> String {
     let mut text = String::new();
-    for kind in &NODES {
+    for kind in nodes {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{}:\n  ros__parameters:\n    use_sim_time: true", kind.name);
+        let _ = writeln!(text, "{}:\n  ros__parameters:", kind.name);
+        if let Some(simulated) = simulated {
+            let _ = writeln!(text, "    use_sim_time: {simulated}");
+        }
         let mut current = String::new();
         for spec in (kind.specs)() {
             let (group, field) = spec.name.split_once('.').unwrap_or(("", &spec.name));
@@ -92,8 +124,7 @@ pub(crate) fn parameter_file(settings: &[Setting]) -> String {
                 current = group.to_owned();
                 let _ = writeln!(text, "    {group}:");
             }
-            let set = settings.iter().rev().find(|s| s.node == kind.name && s.name == spec.name);
-            let value = set.map_or(&spec.default, |s| &s.value);
+            let value = value_of(&spec, kind.name, settings);
             let _ = writeln!(text, "      # {}\n      {field}: {value}", describe(&spec));
         }
     }

@@ -6,6 +6,7 @@ mod doctor;
 mod evaluate;
 mod filter;
 mod input;
+mod launch;
 mod model;
 mod node;
 mod objects;
@@ -24,6 +25,8 @@ use std::process::ExitCode;
 pub enum Command {
     /// Model an object from the first view to the mesh, with a simulated robot
     Model(model::Model),
+    /// Start the nodes, for play or for a real robot
+    Launch(launch::Launch),
     /// Run one node
     Node(node::Node),
     /// Make a watertight mesh from scans
@@ -59,6 +62,7 @@ impl Command {
         match self {
             Command::Node(command) => return command.run(),
             Command::Model(command) => command.run(),
+            Command::Launch(command) => command.run(),
             Command::Reconstruct(command) => command.run(),
             Command::Register(command) => command.run(),
             Command::Filter(command) => command.run(),

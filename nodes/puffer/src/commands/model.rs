@@ -1,6 +1,5 @@
 //! `puffer model`: models an object from the first view to the mesh, over DDS.
 
-use crate::failure::usage;
 use crate::run::{Plan, Run};
 use crate::setups;
 use anyhow::Result;
@@ -51,13 +50,7 @@ pub struct Model {
 
 impl Model {
     pub(super) fn run(&self) -> Result<()> {
-        let Some(mut settings) = setups::settings(&self.setup) else {
-            return Err(usage(format!(
-                "there is no set-up {}; there are {}",
-                self.setup,
-                setups::names()
-            )));
-        };
+        let mut settings = setups::of(&self.setup)?;
         let mut set = |node, name: &'static str, value: serde_json::Value| {
             settings.push(setups::Setting { node, name: name.into(), value });
         };

@@ -17,8 +17,10 @@ pub(crate) struct Crew {
     pub domain: u16,
     /// ROS parameter file.
     pub params: PathBuf,
-    /// Where their lines go.
-    pub log: PathBuf,
+    /// ROS arguments behind it.
+    pub more: Vec<String>,
+    /// Where their lines go; none: to the terminal.
+    pub log: Option<PathBuf>,
 }
 
 /// Running nodes. Dropping it stops them without grace.

@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::fs::{File, OpenOptions};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 use tokio::process::{Child, Command};
@@ -17,33 +17,41 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Lines of a lost node that are told.
 const LAST_LINES: usize = 3;
 
+fn open(log: &Path) -> Result<File> {
+    OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(log)
+        .with_context(|| format!("cannot write {}", log.display()))
+}
+
 /// The processes.
 pub(crate) struct Processes {
     children: Vec<(&'static str, Child)>,
-    log: PathBuf,
+    log: Option<PathBuf>,
 }
 
 impl Processes {
     pub(super) fn start(crew: &Crew) -> Result<Processes> {
         let program = std::env::current_exe().context("cannot find this program's own file")?;
-        let log = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&crew.log)
-            .with_context(|| format!("cannot write {}", crew.log.display()))?;
+        let log = crew.log.as_deref().map(open).transpose()?;
         let mut processes = Processes { children: Vec::new(), log: crew.log.clone() };
         for node in &crew.nodes {
-            let lines = |file: &File| file.try_clone().map(Stdio::from);
+            let lines = || match &log {
+                Some(file) => file.try_clone().map(Stdio::from),
+                None => Ok(Stdio::inherit()),
+            };
             let child = Command::new(&program)
                 .args(["node", "--with-parent", node.name, "--ros-args", "--params-file"])
                 .arg(&crew.params)
+                .args(&crew.more)
                 .env("ROS_DOMAIN_ID", crew.domain.to_string())
                 // The terminal's Ctrl-C is for this process, which ends them in order. They end, too, when the other
                 // end of their standard input is gone with this process.
                 .process_group(0)
                 .stdin(Stdio::piped())
-                .stdout(lines(&log)?)
-                .stderr(lines(&log)?)
+                .stdout(lines()?)
+                .stderr(lines()?)
                 .kill_on_drop(true)
                 .spawn()
                 .with_context(|| format!("cannot start {}", node.name))?;
@@ -65,7 +73,7 @@ impl Processes {
                 child.try_wait().ok().flatten().map(|status| (*name, status))
             });
             if let Some((name, status)) = ended {
-                return format!("{name} has ended ({status}): {}", self.last_words(name));
+                return format!("{name} has ended ({status}){}", self.last_words(name));
             }
             tokio::time::sleep(LOOK_EVERY).await;
         }
@@ -73,10 +81,12 @@ impl Processes {
 
     /// The last lines of the log that name the node, or that are errors.
     fn last_words(&self, name: &str) -> String {
-        let text = std::fs::read_to_string(&self.log).unwrap_or_default();
+        // On the terminal they stand already.
+        let Some(log) = &self.log else { return String::new() };
+        let text = std::fs::read_to_string(log).unwrap_or_default();
         let tells = |line: &&str| line.contains(name) || line.starts_with("error:");
         let lines: Vec<&str> = text.lines().filter(tells).collect();
-        lines[lines.len().saturating_sub(LAST_LINES)..].join(" / ")
+        format!("; its last lines: {}", lines[lines.len().saturating_sub(LAST_LINES)..].join(" / "))
     }
 
     pub(super) async fn stop(mut self) -> Vec<String> {

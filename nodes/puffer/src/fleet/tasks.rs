@@ -19,7 +19,8 @@ impl Tasks {
     pub(super) fn start(crew: &Crew) -> Result<Tasks> {
         let file = crew.params.to_str().context("the parameter file's path is not UTF-8")?;
         let args = ["--ros-args", "--params-file", file].map(str::to_owned);
-        let args = RosArgs::parse(args)?.with_domain(crew.domain);
+        let args = RosArgs::parse(args.into_iter().chain(crew.more.iter().cloned()))?
+            .with_domain(crew.domain);
         let stop = Stop::new();
         let running = crew
             .nodes

@@ -8,7 +8,7 @@ mod table;
 
 use crate::fleet::{Crew, Fleet, domain};
 use crate::nodes::NODES;
-use crate::setups::{Setting, parameter_file};
+use crate::setups::{Setting, output, parameter_file};
 use anyhow::{Context, Result, anyhow, bail};
 use folder::RunFolder;
 use goal::{Ending, pursue};
@@ -64,17 +64,9 @@ impl Run {
             .file_stem()
             .map_or_else(String::new, |s| s.to_string_lossy().into());
         let folder = RunFolder::create(plan.out.as_deref(), &format!("{}-{stem}", plan.setup))?;
-        let text = |path: &Path| Value::from(path.display().to_string());
-        for (node, name, value) in [
-            ("mock_driver", "driver.truth_folder", text(folder.path())),
-            ("mesh_reconstructor", "mesh.output_folder", text(folder.path())),
-            ("modeller", "modeller.run_folder", text(folder.path())),
-            ("modeller", "modeller.mesh_path", "mesh.ply".into()),
-        ] {
-            plan.settings.push(Setting { node, name: name.into(), value });
-        }
+        plan.settings.extend(output(&folder.path().display().to_string()));
         let params = folder.file("params.yaml");
-        std::fs::write(&params, parameter_file(&plan.settings))
+        std::fs::write(&params, parameter_file(&NODES, &plan.settings, Some(true)))
             .with_context(|| format!("cannot write {}", params.display()))?;
         Ok(Run { plan, folder, domain })
     }
@@ -121,7 +113,8 @@ impl Run {
             nodes: NODES.iter().collect(),
             domain: self.domain,
             params: self.folder.file("params.yaml"),
-            log: self.folder.file("log.txt"),
+            more: Vec::new(),
+            log: Some(self.folder.file("log.txt")),
         };
         eprintln!("run folder {}", self.folder.path().display());
         // Before those who speak.
@@ -188,7 +181,7 @@ impl Run {
 }
 
 /// An object that cannot be simulated is told before anything is started.
-fn check_object(object: &str) -> Result<()> {
+pub(crate) fn check_object(object: &str) -> Result<()> {
     let path = Path::new(object);
     if path.extension().is_some() || path.exists() {
         let mesh: Mesh = puffer_core::mesh::io::read_mesh(path)?;
