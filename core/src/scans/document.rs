@@ -129,7 +129,7 @@ fn exact(pose: Pose, quaternion: &Value) -> Pose {
         return pose;
     };
     let quaternion = Quaternion::new(w, x, y, z);
-    if !((quaternion.norm() - 1.0).abs() < SAME_ROTATION) {
+    if quaternion.norm().is_nan() || (quaternion.norm() - 1.0).abs() >= SAME_ROTATION {
         return pose;
     }
     let rotation = UnitQuaternion::new_unchecked(quaternion);

@@ -1,6 +1,9 @@
 //! A node that other DDS implementations can be tried against: it echoes `~/in` on `~/out`, tells a latched word on
 //! `~/word`, answers `~/switch`, and with the parameter `peer.ask` calls `/switch` until it is answered.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use puffer_core::param_groups;
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_msgs::std_srvs::srv::{SetBool, SetBoolRequest, SetBoolResponse};

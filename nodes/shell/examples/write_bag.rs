@@ -1,6 +1,9 @@
 //! Writes a small bag of several types: `write_bag OUT.mcap`. tests/independent/bag_check.py reads it with other
 //! implementations.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use puffer_msgs::builtin_interfaces::msg::Time;
 use puffer_msgs::geometry_msgs::msg::TransformStamped;
 use puffer_msgs::msg::RegisteredScan;

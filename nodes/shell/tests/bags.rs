@@ -1,5 +1,8 @@
 //! A bag recorded from topics, and played to others.
 
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
 use common::{SOON, eventually, free_domain, node};

@@ -56,6 +56,5 @@ pub fn mesh_from_message(message: &ModelMesh) -> Result<Mesh, String> {
         normals: vectors(&message.normals),
         sigma: message.sigma.iter().map(|s| f64::from(*s)).collect(),
         observed: message.observed.iter().map(|o| *o != 0).collect(),
-        ..Mesh::default()
     })
 }
