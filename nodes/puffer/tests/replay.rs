@@ -100,6 +100,8 @@ fn a_bag_gives_the_mesh_of_its_run_byte_for_byte() {
         topics.iter().find(|t| t["name"] == name).and_then(|t| t["count"].as_u64()).unwrap()
     };
     assert_eq!(info["damage"].as_array().map(Vec::len), Some(0), "{info}");
+    let (start, end) = (info["start"].as_f64().unwrap(), info["end"].as_f64().unwrap());
+    assert!(start < end && end < 1000.0, "the times are not those of the robot: {info}");
     assert_eq!(info["notes"]["setup"], "omnirob_stereo");
     assert_eq!(count("/points") as f64, report["scans"].as_f64().unwrap());
     for once in ["/registered_poses", "/filtered_cloud", "/model_mesh", "/tf_static"] {
