@@ -3,7 +3,10 @@
 1. Both read what the example write_bag wrote: overview, times, values, with the definitions from the bag.
 2. Our reader (the example read_bag) reads that bag, the same bag cut off, and bags that rosbags wrote.
 
+3. Both read the bag of a run, in whole, and count what `puffer bag info` counts.
+
 bag_check.py FOLDER_OF_THE_EXAMPLES, after: cargo build --release -p puffer_shell --examples
+bag_check.py --run BAG PUFFER, with the bag of a run and the program
 Wants: pip install -r requirements-bags.txt
 """
 
@@ -199,11 +202,51 @@ def check_theirs(examples: Path, folder: Path) -> None:
     check("our reader: what that command makes", overview["topics"][0][:3] == ["/clock", "rosgraph_msgs/msg/Clock", 1])
 
 
+def check_run(path: Path, puffer: Path) -> None:
+    """The bag of a run, with definitions from the bag alone."""
+    run = subprocess.run([puffer, "bag", "info", "--json", path], capture_output=True, text=True, check=True)
+    info = json.loads(run.stdout)
+    told = {topic["name"]: topic["count"] for topic in info["topics"]}
+    check("puffer bag info: no damage", info["damage"] == [])
+    with AnyReader([path]) as reader:
+        theirs = [
+            (c.topic, at, plain(reader.deserialize(data, c.msgtype))) for c, at, data in reader.messages()
+        ]
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        mcap = [
+            (channel.topic, message.log_time, plain(decoded))
+            for _, channel, message, decoded in reader.iter_decoded_messages()
+        ]
+        notes = {m.name: m.metadata for m in reader.iter_metadata()}
+    for name, messages in {"rosbags": theirs, "mcap-ros2-support": mcap}.items():
+        counts = dict.fromkeys(told, 0)
+        for topic, _, _ in messages:
+            counts[topic] += 1
+        check(f"{name}: {len(messages)} messages of {sum(map(bool, counts.values()))} topics", counts == told)
+    same = [sorted(json.dumps(message, sort_keys=True) for message in messages) for messages in (theirs, mcap)]
+    check("rosbags and mcap-ros2-support agree in all fields", same[0] == same[1])
+    check("the run's notes", notes["puffer"] == info["notes"] and "ros__parameters" in notes["puffer"]["params"])
+    clouds = [m for topic, _, m in theirs if topic == "/points"]
+    scans = {m["id"] for topic, _, m in theirs if topic == "/registered_scan"}
+    check(f"{len(clouds)} clouds, each with a verdict", len(clouds) == len(scans) > 0)
+    poses = {p for topic, _, m in theirs if topic == "/tf" for p in [stamp_of(m["transforms"][0])]}
+    check("a transform at the stamp of each cloud", all(stamp_of(m) in poses for m in clouds))
+
+
+def stamp_of(message: dict) -> tuple[int, int]:
+    stamp = message["header"]["stamp"]
+    return stamp["sec"], stamp["nanosec"]
+
+
 def main() -> int:
-    examples = Path(sys.argv[1]).resolve()
-    with tempfile.TemporaryDirectory() as folder:
-        check_ours(examples, Path(folder))
-        check_theirs(examples, Path(folder))
+    if sys.argv[1] == "--run":
+        check_run(Path(sys.argv[2]).resolve(), Path(sys.argv[3]).resolve())
+    else:
+        examples = Path(sys.argv[1]).resolve()
+        with tempfile.TemporaryDirectory() as folder:
+            check_ours(examples, Path(folder))
+            check_theirs(examples, Path(folder))
     print(f"{len(failures)} failures")
     return 1 if failures else 0
 

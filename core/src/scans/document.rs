@@ -129,11 +129,9 @@ fn exact(pose: Pose, quaternion: &Value) -> Pose {
         return pose;
     };
     let quaternion = Quaternion::new(w, x, y, z);
-    if quaternion.norm().is_nan() || (quaternion.norm() - 1.0).abs() >= SAME_ROTATION {
-        return pose;
-    }
     let rotation = UnitQuaternion::new_unchecked(quaternion);
-    if pose.rotation.angle_to(&rotation) < SAME_ROTATION {
+    let is_unit = (quaternion.norm() - 1.0).abs() < SAME_ROTATION;
+    if is_unit && pose.rotation.angle_to(&rotation) < SAME_ROTATION {
         Pose::from_parts(pose.translation, rotation)
     } else {
         pose

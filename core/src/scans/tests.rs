@@ -354,3 +354,31 @@ fn a_folder_grows_view_by_view_and_a_view_may_come_again() {
     assert_eq!((read.support, read.pose_sigma), (set().support, set().pose_sigma));
     assert!(document(&folder.path().join("scans"))["views"][0]["verdict"].is_null());
 }
+
+#[test]
+fn a_pose_comes_back_bit_by_bit_unless_somebody_changed_its_matrix() {
+    let set = ScanSet {
+        views: (0..50)
+            .map(|i| View {
+                name: format!("v{i}"),
+                scan: Scan { points: vec![[0.1, 0.0, 0.5]], ..Scan::default() },
+                object_from_sensor: pose(f64::from(i) * 0.37 + 0.01),
+            })
+            .collect(),
+        ..ScanSet::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    write_scans(folder.path(), &set, &[]).unwrap();
+    let read = read_scans(folder.path(), Unit::M).unwrap();
+    assert!(read.views == set.views, "a pose has changed");
+    let other = pose(3.0);
+    change(folder.path(), |json| {
+        json["views"][0]["object_from_sensor"] = document::matrix(&other, Unit::M);
+        json["views"][1]["quaternion"] = json!("none");
+    });
+    let read = read_scans(folder.path(), Unit::M).unwrap();
+    for (i, expected) in [(0, other), (1, set.views[1].object_from_sensor)] {
+        let difference = log(&(expected.inverse() * read.views[i].object_from_sensor)).norm();
+        assert!(difference < 1e-12, "view {i}: {difference}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Opening a bag.
 
 use super::error::BagError;
-use super::index::Index;
+use super::index::{Block, Index};
 use super::info::{BagInfo, BagTopic};
 use super::messages::{Messages, stamp};
 use super::{folder, scan, summary};
@@ -39,8 +39,9 @@ impl BagReader {
         }
         info.topics = topics.into_values().collect();
         info.count = info.topics.iter().map(|topic| topic.count).sum();
-        let blocks =
-            || self.files.iter().flat_map(|file| &file.blocks).filter(|b| b.start <= b.end);
+        // A chunk that announces topics and holds no message has the times 0 and 0.
+        let dated = |b: &&Block| b.start <= b.end && b.end > 0;
+        let blocks = || self.files.iter().flat_map(|file| &file.blocks).filter(dated);
         if info.count > 0 {
             info.start = stamp(blocks().map(|block| block.start).min().unwrap_or_default());
             info.end = stamp(blocks().map(|block| block.end).max().unwrap_or_default());

@@ -85,6 +85,9 @@ impl Play {
         let player = Player::new(node, &routes)?;
         let ready = stop.or(player.wait_for_readers(READERS_DEADLINE)).await;
         if let Err(error) = ready.ok_or_else(interrupted)? {
+            if self.finish {
+                return Err(error.context("the nodes must run before the bag is played"));
+            }
             // A bag may hold more than anybody asks for.
             eprintln!("puffer: {error:#}; playing all the same");
         }
