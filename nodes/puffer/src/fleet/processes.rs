@@ -81,8 +81,7 @@ impl Processes {
 
     /// The last lines of the log that name the node, or that are errors.
     fn last_words(&self, name: &str) -> String {
-        // On the terminal they stand already.
-        let Some(log) = &self.log else { return String::new() };
+        let Some(log) = &self.log else { return "; its lines stand above".to_owned() };
         let text = std::fs::read_to_string(log).unwrap_or_default();
         let tells = |line: &&str| line.contains(name) || line.starts_with("error:");
         let lines: Vec<&str> = text.lines().filter(tells).collect();
