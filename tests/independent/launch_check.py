@@ -67,7 +67,7 @@ def starts(program, started):
     """Start a node as its action says; it must come up and end on demand."""
     files = [word for path in started.parameters for word in ('--params-file', path)]
     command = [program, 'node', started.executable, '--ros-args', *files]
-    environment = {**os.environ, 'ROS_DOMAIN_ID': '97'}
+    environment = {'ROS_DOMAIN_ID': '97', **os.environ}
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
