@@ -133,7 +133,14 @@ impl<'a> Runner<'a> {
         };
         self.journal.took(stage, since.elapsed());
         self.journal.note(&format!("{stage}_seconds"), since.elapsed().as_secs_f64());
-        result.unwrap_or_else(|error| Event::Failed(format!("{error:#}")))
+        result.unwrap_or_else(|error| {
+            // What the end of the node breaks off has not failed.
+            if self.node.stop().is_stopped() {
+                Event::Cancel
+            } else {
+                Event::Failed(format!("{error:#}"))
+            }
+        })
     }
 
     async fn plan(&mut self, scans: usize) -> Result<Event> {

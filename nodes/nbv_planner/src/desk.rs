@@ -26,6 +26,8 @@ pub(crate) struct Desk {
     scans: BTreeMap<u32, Held>,
     robot: Option<Workcell>,
     description: String,
+    /// What is wrong with the newest description.
+    fault: Option<String>,
     joints: Option<Vec<f64>>,
     /// Whether the space must be made anew because poses have changed.
     stale: bool,
@@ -55,6 +57,7 @@ impl Desk {
             scans: BTreeMap::new(),
             robot: None,
             description: String::new(),
+            fault: None,
             joints: None,
             stale: false,
         })
@@ -88,12 +91,19 @@ impl Desk {
         if self.description == urdf {
             return Ok(());
         }
-        let robot = RobotModel::from_urdf(urdf).context("robot_description")?;
-        self.robot = Some(Workcell::new(robot).context("robot_description")?);
+        // Planning goes on with the newest description or none.
         self.description = urdf.to_owned();
-        self.joints = None;
-        self.stale = true;
+        (self.robot, self.joints, self.stale) = (None, None, true);
+        let workcell = RobotModel::from_urdf(urdf).and_then(Workcell::new);
+        let workcell = workcell.context("robot_description");
+        self.fault = workcell.as_ref().err().map(|error| format!("{error:#}"));
+        self.robot = Some(workcell?);
         Ok(())
+    }
+
+    /// What is wrong with the robot's description, which waiting does not mend.
+    pub(crate) fn fault(&self) -> Option<String> {
+        self.fault.clone()
     }
 
     /// Takes the joint positions; names that the robot does not have are passed over.

@@ -105,10 +105,13 @@ async fn wait_for(
 ) -> std::result::Result<(), Box<PlanViewResponse>> {
     let since = Instant::now();
     loop {
-        let (missing, there) = {
+        let (fault, missing, there) = {
             let desk = desk.lock().await;
-            (desk.missing(scans), desk.scans())
+            (desk.fault(), desk.missing(scans), desk.scans())
         };
+        if let Some(fault) = fault {
+            return Err(Box::new(failed(PlanViewResponse::NO_ROBOT, fault)));
+        }
         let Some(missing) = missing else { return Ok(()) };
         if since.elapsed() > deadline {
             let code = if there < scans {

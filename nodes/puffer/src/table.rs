@@ -1,6 +1,7 @@
 //! Tables of names and values.
 
 use serde_json::{Map, Value};
+use std::io::Write;
 
 /// A list of results that prints as a table or as one JSON object.
 #[derive(Default)]
@@ -30,7 +31,7 @@ impl Report {
     /// Prints to standard output.
     pub(crate) fn print(self, json: bool) {
         if json {
-            println!("{}", Value::Object(self.json));
+            print_text(&format!("{}\n", Value::Object(self.json)));
             return;
         }
         print_rows(&self.rows);
@@ -40,7 +41,18 @@ impl Report {
 /// Prints labels and texts in two columns.
 pub(crate) fn print_rows(rows: &[(String, String)]) {
     let width = rows.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
-    for (label, text) in rows {
-        println!("{label:<width$}  {text}");
+    let line = |(label, text): &(String, String)| format!("{label:<width$}  {text}\n");
+    print_text(&rows.iter().map(line).collect::<String>());
+}
+
+/// Prints to standard output. A reader that has seen enough, as `head` has, is no fault.
+pub(crate) fn print_text(text: &str) {
+    let mut out = std::io::stdout().lock();
+    if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        eprintln!("puffer: cannot write to standard output: {error}");
+        std::process::exit(1);
     }
 }

@@ -23,6 +23,48 @@ fn the_committed_file_is_what_the_program_prints() {
 }
 
 #[test]
+fn the_committed_files_of_the_set_ups_are_what_the_program_prints() {
+    for setup in puffer_core::robot::SETUPS {
+        let path = format!("{}/../../params/{setup}.yaml", env!("CARGO_MANIFEST_DIR"));
+        let committed = std::fs::read_to_string(path).unwrap_or_default();
+        let call = ["params", "--setup", setup, "--yaml"];
+        let same = committed == common::stdout(Path::new("."), &call);
+        assert!(same, "out of date: puffer params --setup {setup} --yaml > params/{setup}.yaml");
+        let document: Value = serde_yaml_ng::from_str(&committed).unwrap();
+        let driver = &document["mock_driver"]["ros__parameters"]["driver"];
+        assert_eq!(driver["setup"], setup);
+    }
+}
+
+#[test]
+fn every_nodes_parameters_are_listed_and_described() {
+    let listed = common::json(Path::new("."), &["params", "--json"]);
+    let listed = listed.as_array().unwrap();
+    for node in [
+        "mock_driver",
+        "scan_registrar",
+        "nbv_planner",
+        "cloud_filter",
+        "mesh_reconstructor",
+        "modeller",
+    ] {
+        let own: Vec<&Value> = listed.iter().filter(|spec| spec["node"] == node).collect();
+        assert!(own.len() > 3, "{node} has {} parameters", own.len());
+        for spec in own {
+            assert!(spec["description"].as_str().unwrap().len() > 5, "{spec}");
+        }
+        let text = common::stdout(Path::new("."), &["params", "--node", node, "--yaml"]);
+        let file: Value = serde_yaml_ng::from_str(&text).unwrap();
+        assert_eq!(file.as_object().unwrap().keys().collect::<Vec<_>>(), [node]);
+    }
+    let laser = ["params", "--node", "nbv_planner", "--setup", "kr16_laser", "--json"];
+    let laser = common::json(Path::new("."), &laser);
+    let support =
+        laser.as_array().unwrap().iter().find(|spec| spec["name"] == "planner.support").unwrap();
+    assert_eq!((&support["value"], &support["default"]), (&json!("table"), &json!("none")));
+}
+
+#[test]
 fn the_printed_file_gives_the_defaults() {
     let document: Value = serde_yaml_ng::from_str(&printed()).unwrap();
     // From other values, so that a parameter left out of the file is noticed.

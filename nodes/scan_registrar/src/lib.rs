@@ -9,7 +9,7 @@ mod refine;
 
 pub use puffer_shell::scans::RegistrarParams as Params;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use puffer_core::register::Status;
 use puffer_core::robot::RobotModel;
 use puffer_msgs::msg::RegisteredScan;
@@ -57,7 +57,8 @@ struct Desk {
     node: Node<Params>,
     intake: Arc<Mutex<Intake>>,
     scans: Arc<BulkPublisher>,
-    robot: Option<RobotModel>,
+    /// The robot, or what is wrong with its newest description.
+    robot: Option<Result<RobotModel, String>>,
     descriptions: Subscription<Text>,
     tf: TfBuffer,
 }
@@ -95,6 +96,8 @@ impl Desk {
             self.describe(deadline).await?;
         }
         let robot = self.robot.as_ref().filter(|_| params.cut_bodies);
+        let robot = robot.map(|robot| robot.as_ref().map_err(|fault| anyhow!("{fault}")));
+        let robot = robot.transpose()?;
         Observation::new(cloud, &self.tf, robot, &params).map_err(anyhow::Error::msg)
     }
 
@@ -110,8 +113,8 @@ impl Desk {
             )?);
         }
         if let Some(text) = newest {
-            let robot = RobotModel::from_urdf(&text.data).context("robot_description")?;
-            self.robot = Some(robot);
+            let robot = RobotModel::from_urdf(&text.data);
+            self.robot = Some(robot.map_err(|fault| format!("robot_description: {fault}")));
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use crate::failure::usage;
 use crate::nodes::{NODES, NodeKind};
 use crate::setups::{self, Setting, describe, parameter_file, value_of};
-use crate::table::print_rows;
+use crate::table::{print_rows, print_text};
 use anyhow::Result;
 use clap::Args;
 use puffer_core::params::{ParamSpec, Parameters};
@@ -40,9 +40,9 @@ impl Params {
     pub(super) fn run(&self) -> Result<()> {
         let listed = self.listed()?;
         if self.yaml {
-            print!("{}", self.as_yaml(&listed));
+            print_text(&self.as_yaml(&listed));
         } else if self.json {
-            println!("{}", listed.as_json());
+            print_text(&format!("{}\n", listed.as_json()));
         } else {
             listed.print();
         }
@@ -96,7 +96,7 @@ impl Listed {
         print_rows(&self.stages.iter().map(|spec| row(spec, &spec.default)).collect::<Vec<_>>());
         let mut first = self.stages.is_empty();
         for kind in &self.nodes {
-            println!("{}{}", if first { "" } else { "\n" }, kind.name);
+            print_text(&format!("{}{}\n", if first { "" } else { "\n" }, kind.name));
             first = false;
             let specs = (kind.specs)();
             let rows = specs.iter().map(|s| row(s, value_of(s, kind.name, &self.settings)));

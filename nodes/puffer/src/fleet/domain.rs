@@ -7,6 +7,8 @@ use std::net::UdpSocket;
 const DOMAINS: std::ops::RangeInclusive<u16> = 101..=230;
 /// Participants of a domain whose ports must be free.
 const PARTICIPANTS: u16 = 12;
+/// Participants of a domain on one machine at most, 250 ports being a domain's.
+const MOST_PARTICIPANTS: u16 = 120;
 
 /// Ports of a domain (RTPS 2.5, 9.6.2.3): discovery and data by multicast, and by unicast for each participant.
 fn ports(domain: u16) -> impl Iterator<Item = u16> {
@@ -19,6 +21,18 @@ fn ports(domain: u16) -> impl Iterator<Item = u16> {
 /// Whether no socket on this machine is bound to a port of the domain.
 pub(crate) fn is_free(domain: u16) -> bool {
     ports(domain).all(|port| UdpSocket::bind(("0.0.0.0", port)).is_ok())
+}
+
+/// How many more participants of this machine have room on the domain, and how many it has room for at all.
+pub(crate) fn free_participants(domain: u16) -> (usize, usize) {
+    let base = 7400 + 250 * domain;
+    // Beyond, a participant's ports are those of the next domain.
+    let ports = (0..MOST_PARTICIPANTS).filter_map(|p| base.checked_add(11 + 2 * p));
+    let is_free = |port: &u16| {
+        [port - 1, *port].iter().all(|port| UdpSocket::bind(("0.0.0.0", *port)).is_ok())
+    };
+    let ports: Vec<u16> = ports.collect();
+    (ports.iter().filter(|port| is_free(port)).count(), ports.len())
 }
 
 /// A free domain. Which one is tried first depends on the process, so that two runs that begin at once do not meet.

@@ -69,24 +69,31 @@ impl Processes {
 
     pub(super) async fn loss(&mut self) -> String {
         loop {
-            let ended = self.children.iter_mut().find_map(|(name, child)| {
-                child.try_wait().ok().flatten().map(|status| (*name, status))
+            let mut children = self.children.iter_mut().enumerate();
+            let ended = children.find_map(|(place, (name, child))| {
+                child.try_wait().ok().flatten().map(|status| (place, *name, status))
             });
-            if let Some((name, status)) = ended {
+            if let Some((place, name, status)) = ended {
+                self.children.remove(place);
                 return format!("{name} has ended ({status}){}", self.last_words(name));
             }
             tokio::time::sleep(LOOK_EVERY).await;
         }
     }
 
-    /// The last lines of the log that name the node, or that are errors.
+    /// The last complaints in the log that name the node.
     fn last_words(&self, name: &str) -> String {
-        // On the terminal they stand already.
-        let Some(log) = &self.log else { return String::new() };
+        let Some(log) = &self.log else { return "; its lines stand above".to_owned() };
         let text = std::fs::read_to_string(log).unwrap_or_default();
-        let tells = |line: &&str| line.contains(name) || line.starts_with("error:");
-        let lines: Vec<&str> = text.lines().filter(tells).collect();
-        format!("; its last lines: {}", lines[lines.len().saturating_sub(LAST_LINES)..].join(" / "))
+        let complains = |line: &&str| {
+            let grave = ["error:", "[ERROR]", "[WARN]", "thread"];
+            line.contains(name) && grave.iter().any(|word| line.starts_with(word))
+        };
+        let lines: Vec<&str> = text.lines().filter(complains).collect();
+        match &lines[lines.len().saturating_sub(LAST_LINES)..] {
+            [] => String::new(),
+            last => format!("; it said: {}", last.join(" / ")),
+        }
     }
 
     pub(super) async fn stop(mut self) -> Vec<String> {

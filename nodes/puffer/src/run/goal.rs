@@ -43,10 +43,17 @@ pub(crate) async fn pursue(node: &Node<NoParams>, object: &str, stop: &Stop) -> 
             Some(None) => break,
             None => {
                 eprintln!("puffer: interrupted, stopping");
-                handle.cancel(CANCEL_DEADLINE).await?;
-                return Ok(match handle.result(CANCEL_DEADLINE).await? {
-                    Outcome::Succeeded(_) => Ending::Modelled,
-                    _ => Ending::Cancelled,
+                let cancelled = async {
+                    handle.cancel(CANCEL_DEADLINE).await?;
+                    handle.result(CANCEL_DEADLINE).await
+                };
+                return Ok(match cancelled.await {
+                    Ok(Outcome::Succeeded(_)) => Ending::Modelled,
+                    Ok(_) => Ending::Cancelled,
+                    Err(error) => {
+                        eprintln!("puffer: the modeller does not stop: {error}");
+                        Ending::Cancelled
+                    }
                 });
             }
         }

@@ -127,11 +127,11 @@ impl Run {
         let roll: Vec<String> =
             fleet.roll().iter().map(|(name, process)| format!("{name} {process}")).collect();
         eprintln!("nodes on DDS domain {}: {}", self.domain, roll.join(", "));
-        // Its own stop: Ctrl-C cancels the goal first, and the goal needs the node.
-        let args = RosArgs::parse(std::iter::empty())?.with_domain(self.domain);
-        let node: Node<NoParams> = Node::start("puffer_model", args, Stop::new()).await?;
         let ending = tokio::select! {
-            ending = pursue(&node, &self.plan.object, &stop) => ending?,
+            // Whatever it was, the nodes are stopped in order.
+            ending = self.pursue(&stop) => {
+                ending.unwrap_or_else(|error| Ending::Failed(format!("{error:#}")))
+            }
             why = fleet.loss() => Ending::Failed(why),
         };
         let mut problems = fleet.stop().await;
@@ -155,6 +155,13 @@ impl Run {
             ("seed", seed.map_or_else(String::new, |s| s.value.to_string())),
         ];
         Ok(notes.map(|(key, text)| (key.to_owned(), text)).into())
+    }
+
+    async fn pursue(&self, stop: &Stop) -> Result<Ending> {
+        // Its own stop: Ctrl-C cancels the goal first, and the goal needs the node.
+        let args = RosArgs::parse(std::iter::empty())?.with_domain(self.domain);
+        let node: Node<NoParams> = Node::start("puffer_model", args, Stop::new()).await?;
+        pursue(&node, &self.plan.object, stop).await
     }
 
     /// What the report says beside the modeller's part.

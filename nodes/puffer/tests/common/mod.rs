@@ -1,6 +1,8 @@
 //! Running the program.
 #![allow(dead_code)] // Each test file uses a part.
 
+pub mod processes;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
