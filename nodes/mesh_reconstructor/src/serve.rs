@@ -82,7 +82,11 @@ impl Counter {
         let Made { mesh, response } = match made {
             Ok(made) => made,
             Err(response) => {
-                tracing::error!("no mesh: {}", response.message);
+                if response.error_code == ReconstructResponse::CANCELLED {
+                    tracing::info!("no mesh: {}", response.message);
+                } else {
+                    tracing::error!("no mesh: {}", response.message);
+                }
                 return *response;
             }
         };

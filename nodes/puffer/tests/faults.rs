@@ -96,6 +96,10 @@ fn arguments_of_runs() {
     }
     let call = ["launch", "--setup", "kr16_laser", "--driver", "none", "--object", "mug"];
     refused(folder, &call, USAGE, &["--object", "mock driver"]);
+    for number in ["233", "999", "-1"] {
+        let output = puffer(folder, &["model", "--domain", number]);
+        assert_eq!(output.status.code(), Some(USAGE), "{number}");
+    }
     std::fs::create_dir(folder.join("taken")).unwrap();
     std::fs::write(folder.join("taken/mesh.ply"), "mine").unwrap();
     refused(folder, &["model", "--out", "taken"], USAGE, &["taken", "holds something already"]);

@@ -37,8 +37,8 @@ pub struct Model {
     /// Sets a parameter of a node, as in --set nbv_planner:view.voxel_edge=0.003; may be repeated
     #[arg(long = "set", value_name = "NODE:NAME=VALUE")]
     settings: Vec<String>,
-    /// DDS domain [default: a free one]
-    #[arg(long)]
+    /// DDS domain, 0 to 232 [default: a free one]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
     /// Record no bag
     #[arg(long)]

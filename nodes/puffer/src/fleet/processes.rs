@@ -5,8 +5,9 @@ use anyhow::{Context, Result};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::fs::{File, OpenOptions};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 use tokio::process::{Child, Command};
 
@@ -16,6 +17,11 @@ const GRACE: Duration = Duration::from_secs(20);
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Lines of a lost node that are told.
 const LAST_LINES: usize = 3;
+
+/// Whether a node ended because it was asked to, be it before it could listen to signals.
+fn was_asked(status: ExitStatus) -> bool {
+    matches!(status.code(), Some(0 | 130)) || status.signal() == Some(Signal::SIGTERM as i32)
+}
 
 fn open(log: &Path) -> Result<File> {
     OpenOptions::new()
@@ -81,13 +87,15 @@ impl Processes {
         }
     }
 
-    /// The last complaints in the log that name the node.
+    /// The last complaints in the log: the node's own, and those that name no node.
     fn last_words(&self, name: &str) -> String {
         let Some(log) = &self.log else { return "; its lines stand above".to_owned() };
         let text = std::fs::read_to_string(log).unwrap_or_default();
+        let own = |line: &str| ["[ERROR]", "[WARN]"].iter().any(|word| line.starts_with(word));
         let complains = |line: &&str| {
-            let grave = ["error:", "[ERROR]", "[WARN]", "thread"];
-            line.contains(name) && grave.iter().any(|word| line.starts_with(word))
+            line.starts_with("error:")
+                || line.contains("panicked at")
+                || own(line) && line.contains(name)
         };
         let lines: Vec<&str> = text.lines().filter(complains).collect();
         match &lines[lines.len().saturating_sub(LAST_LINES)..] {
@@ -106,7 +114,7 @@ impl Processes {
         let mut problems = Vec::new();
         for (name, child) in &mut self.children {
             match tokio::time::timeout(GRACE, child.wait()).await {
-                Ok(Ok(status)) if matches!(status.code(), Some(0 | 130)) => {}
+                Ok(Ok(status)) if was_asked(status) => {}
                 Ok(Ok(status)) => problems.push(format!("{name} ended with {status}")),
                 Ok(Err(error)) => problems.push(format!("{name}: {error}")),
                 Err(_) => {
