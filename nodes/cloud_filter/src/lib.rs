@@ -10,6 +10,7 @@ use puffer_core::filter::FilterParams;
 use puffer_core::pipeline::cloud_hash;
 use puffer_msgs::builtin_interfaces::msg::Time;
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
+use puffer_msgs::sensor_msgs::msg::PointCloud2;
 use puffer_msgs::srv::{Filter, FilterRequest, FilterResponse};
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
@@ -71,7 +72,8 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
 }
 
 fn serve_filter(node: &Node<Params>, store: &Arc<Mutex<Store>>) -> Result<()> {
-    let clouds = Arc::new(node.bulk_publisher("filtered_cloud", Mode::Latched)?);
+    let clouds =
+        Arc::new(node.bulk_publisher_for_all::<PointCloud2>("filtered_cloud", Mode::Latched)?);
     let (shared, store) = (node.clone(), Arc::clone(store));
     node.serve::<Filter, _, _>("~/filter", move |request: FilterRequest| {
         let (node, store, clouds) = (shared.clone(), Arc::clone(&store), Arc::clone(&clouds));

@@ -37,7 +37,7 @@ pub(crate) struct Desk {
 pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let node: Node<Params> = Node::start("mesh_reconstructor", args, stop.clone()).await?;
     let clouds: BulkSubscription<PointCloud2> =
-        node.bulk_subscribe("filtered_cloud", Delivery::Newest)?;
+        node.bulk_subscribe_from_all("filtered_cloud", Delivery::Newest)?;
     let desk = Arc::new(Mutex::new(Desk::default()));
     serve::all(&node, &desk)?;
     tracing::info!("ready");

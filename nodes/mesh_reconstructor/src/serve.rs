@@ -10,6 +10,7 @@ use puffer_msgs::action::{
     ReconstructMesh, ReconstructMeshFeedback, ReconstructMeshGoal, ReconstructMeshResult,
 };
 use puffer_msgs::builtin_interfaces::msg::Time;
+use puffer_msgs::msg::ModelMesh;
 use puffer_msgs::srv::{
     Reconstruct, ReconstructRequest, ReconstructResponse, SaveMesh, SaveMeshRequest,
     SaveMeshResponse,
@@ -41,7 +42,7 @@ pub(crate) fn all(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
     let counter = Arc::new(Counter {
         node: node.clone(),
         desk: Arc::clone(desk),
-        meshes: node.bulk_publisher("model_mesh", Mode::Latched)?,
+        meshes: node.bulk_publisher_for_all::<ModelMesh>("model_mesh", Mode::Latched)?,
         turn: Mutex::new(()),
     });
     let at = Arc::clone(&counter);

@@ -40,7 +40,8 @@ impl Machine {
         let cell = load(&params)?;
         let outputs = Outputs::new(node)?;
         outputs.start(cell.robot(), description(params.setup.name())?)?;
-        let points = node.bulk_publisher("points", Mode::Queue { depth: SCANS_HELD })?;
+        let points = node
+            .bulk_publisher_for_all::<PointCloud2>("points", Mode::Queue { depth: SCANS_HELD })?;
         let machine =
             Machine { q: cell.rest().to_vec(), cell, params, now: START, outputs, points };
         machine.write_truth()?;

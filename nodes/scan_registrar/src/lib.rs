@@ -33,7 +33,8 @@ const SCANS_HELD: usize = 4;
 /// Parameters that do not fit, or no network.
 pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let node: Node<Params> = Node::start("scan_registrar", args, stop.clone()).await?;
-    let points: BulkSubscription<PointCloud2> = node.bulk_subscribe("points", Delivery::Every)?;
+    let points: BulkSubscription<PointCloud2> =
+        node.bulk_subscribe_from_all("points", Delivery::Every)?;
     let scans =
         Arc::new(node.bulk_publisher("registered_scan", Mode::Queue { depth: SCANS_HELD })?);
     let descriptions = node.subscribe("robot_description", Profile::LatchedSub)?;

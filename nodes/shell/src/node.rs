@@ -16,6 +16,7 @@ use puffer_core::params::Parameters;
 use puffer_msgs::diagnostic_msgs::msg::DiagnosticArray;
 use puffer_msgs::rcl_interfaces::msg::Log;
 use puffer_msgs::rosgraph_msgs::msg;
+use ros2_client::MessageTypeName;
 use rustdds::policy::Durability;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -260,6 +261,38 @@ impl<P: Parameters> Node<P> {
             .inner
             .dds
             .with_ros2_node(|node| BulkSubscription::new(node, &topic, delivery))??)
+    }
+
+    /// As [`Node::bulk_publisher`], and whole messages of type `M` for readers that know nothing of tiles (RViz,
+    /// rosbag2, scripts): only while there are any, and only what the host's socket buffers carry.
+    ///
+    /// # Errors
+    /// A name that is not allowed, or no resources.
+    pub fn bulk_publisher_for_all<M: Interface>(
+        &self,
+        topic: &str,
+        mode: Mode,
+    ) -> Result<BulkPublisher> {
+        let publisher = self.bulk_publisher(topic, mode)?;
+        let participant = self.inner.dds.participant();
+        let kind = MessageTypeName::new(M::PACKAGE, M::NAME);
+        Ok(publisher.with_whole_messages(participant, &kind, mode == Mode::Latched)?)
+    }
+
+    /// As [`Node::bulk_subscribe`], and whole messages from writers that know nothing of tiles (a sensor's driver,
+    /// scripts).
+    ///
+    /// # Errors
+    /// A name that is not allowed, or no resources.
+    pub fn bulk_subscribe_from_all<M: Interface>(
+        &self,
+        topic: &str,
+        delivery: Delivery,
+    ) -> Result<BulkSubscription<M>> {
+        let subscription = self.bulk_subscribe::<M>(topic, delivery)?;
+        let participant = self.inner.dds.participant();
+        let kind = MessageTypeName::new(M::PACKAGE, M::NAME);
+        Ok(subscription.with_plain_messages(participant, &kind)?)
     }
 
     /// Answers requests, one after the other, in a task of its own until the node stops.

@@ -96,6 +96,11 @@ impl Dds {
         Endpoint { guid, matches: Arc::clone(&self.matches), graph: Arc::clone(&self.graph) }
     }
 
+    /// The participant itself.
+    pub fn participant(&self) -> &DomainParticipant {
+        &self.participant
+    }
+
     /// Lends a ros2-client node on this participant, for endpoints that are made through that crate.
     pub fn with_ros2_node<T>(&self, make: impl FnOnce(&mut ros2_client::Node) -> T) -> Result<T> {
         let mut foreign = self.foreign.lock().unwrap_or_else(PoisonError::into_inner);
