@@ -4,8 +4,9 @@ use super::bits::Bits;
 use super::wire::TileAck;
 use std::time::{Duration, Instant};
 
-/// A reader that leaves tiles unanswered for so long no longer holds the others up.
-pub(crate) const LAGS_AFTER: Duration = Duration::from_millis(150);
+/// A reader that leaves tiles unanswered for so long no longer holds the others up: far above the time of a healthy
+/// answer (below a millisecond), and above that of one repetition. It loses nothing by that.
+pub(crate) const LAGS_AFTER: Duration = Duration::from_millis(60);
 /// A reader that does not answer for so long loses what there is no room for.
 pub(crate) const STUCK_AFTER: Duration = Duration::from_secs(1);
 /// A reader that has not been heard for so long is gone; readers speak up every second.

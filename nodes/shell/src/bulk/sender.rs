@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 
 /// How often readers that do not answer are asked.
 const PROBE_EVERY: Duration = Duration::from_millis(100);
+/// Bytes held beyond a queue's depth for readers that do not answer, while they are being judged: so long the others go
+/// on.
+const SPARE: usize = 48_000_000;
 /// Tells a reader never to start with a sample: a newer one is there.
 const NEVER: u64 = u64::MAX;
 
@@ -94,11 +97,20 @@ impl Sender {
             } else if force || !self.members.values().any(|m| lacks(m) && !m.is_stuck(now)) {
                 self.counts.missed += u64::from(self.members.values().any(lacks));
             } else {
-                return false;
+                return self.goes_on_without_the_silent(depth.max(1), now);
             }
             self.held.pop_front();
         }
         true
+    }
+
+    /// Whether the readers that answer leave room for a sample, and what is held for the others alone is little enough.
+    fn goes_on_without_the_silent(&self, depth: usize, now: Instant) -> bool {
+        let answering: Vec<&Member> = self.members.values().filter(|m| !m.lags(now)).collect();
+        let (theirs, spare): (Vec<&Held>, Vec<&Held>) =
+            self.held.iter().partition(|h| answering.iter().any(|m| m.done < h.sequence));
+        let spare: usize = spare.iter().map(|h| h.bytes.len()).sum();
+        !answering.is_empty() && theirs.len() < depth && spare <= SPARE
     }
 
     /// Takes a sample; returns its number. There must be room.
