@@ -5,9 +5,9 @@
 
 mod common;
 
+use common::processes::free_domain;
 use common::{PUFFER, json, puffer, stdout};
 use std::fs;
-use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
@@ -43,14 +43,6 @@ impl Drop for Nodes {
             let _ = node.wait();
         }
     }
-}
-
-/// A DDS domain whose first ports (RTPS 2.5, 9.6.2.3) nobody holds.
-fn free_domain() -> u16 {
-    let free = |domain: &u16| {
-        (10..30).all(|offset| UdpSocket::bind(("0.0.0.0", 7400 + 250 * domain + offset)).is_ok())
-    };
-    (60..100).find(free).expect("no DDS domain from 60 to 99 is free")
 }
 
 /// `run/params.yaml` with another folder for what comes out.

@@ -23,6 +23,7 @@ mod clock;
 pub mod convert;
 mod dds;
 mod diagnostics;
+pub mod domain;
 mod entry;
 mod logging;
 mod names;

@@ -6,8 +6,6 @@ use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::bulk::{BulkError, BulkPublisher, BulkSubscription, Delivery, Mode};
 use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions};
 use rustdds::DomainParticipantBuilder;
-use std::net::UdpSocket;
-use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 use tokio::time::timeout;
 
@@ -45,14 +43,7 @@ impl Peer {
 
 /// A domain that nobody uses, another for each test.
 fn domain() -> u16 {
-    static NEXT: AtomicU16 = AtomicU16::new(0);
-    let start = (std::process::id() % 120) as u16;
-    loop {
-        let domain = 100 + (start + NEXT.fetch_add(1, Ordering::Relaxed)) % 120;
-        if UdpSocket::bind(("0.0.0.0", 7410 + 250 * domain)).is_ok() {
-            return domain;
-        }
-    }
+    puffer_shell::domain::free().unwrap()
 }
 
 fn message(k: i32, size: usize) -> Header {

@@ -1,6 +1,5 @@
 //! Nodes started and stopped together: each a process of its own, or all tasks of this one.
 
-pub(crate) mod domain;
 mod processes;
 mod tasks;
 

@@ -6,7 +6,7 @@ mod recorder;
 mod results;
 mod table;
 
-use crate::fleet::{Crew, Fleet, domain};
+use crate::fleet::{Crew, Fleet};
 use crate::nodes::NODES;
 use crate::setups::{Setting, output, parameter_file};
 use anyhow::{Context, Result, anyhow, bail};
@@ -16,7 +16,7 @@ use puffer_core::Error;
 use puffer_core::assess::Assessment;
 use puffer_core::mesh::Mesh;
 use puffer_shell::scans::PARAMETER_NOTE;
-use puffer_shell::{NoParams, Node, RosArgs, Stop};
+use puffer_shell::{NoParams, Node, RosArgs, Stop, domain};
 use recorder::Recorder;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

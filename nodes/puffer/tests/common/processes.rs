@@ -4,7 +4,6 @@ use super::PUFFER;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use std::fs::File;
-use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
@@ -13,18 +12,9 @@ use std::time::{Duration, Instant};
 /// For everything that must come: long enough for a loaded machine.
 pub const SOON: Duration = Duration::from_secs(60);
 
-/// A domain that nobody uses, different for each call; below those that the program chooses for itself.
+/// A domain that nobody uses, another one for each call.
 pub fn free_domain() -> u16 {
-    static NEXT: AtomicU16 = AtomicU16::new(0);
-    let spread = (std::process::id() % 90) as u16;
-    for _ in 0..90 {
-        let domain = 5 + (spread + NEXT.fetch_add(1, Ordering::Relaxed)) % 90;
-        let port = 7400 + 250 * domain;
-        if [0, 10, 11, 12, 13].iter().all(|at| UdpSocket::bind(("0.0.0.0", port + at)).is_ok()) {
-            return domain;
-        }
-    }
-    panic!("no free DDS domain between 5 and 94");
+    puffer_shell::domain::free().unwrap()
 }
 
 /// Waits until `holds` gives something.

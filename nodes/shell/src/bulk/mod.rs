@@ -8,6 +8,7 @@
 //!
 //! `sender` and `receiver` are the protocol, without DDS, threads or clock; [`BulkPublisher`] and [`BulkSubscription`]
 //! run them, each in a thread of its own. Outsiders use the named topic: `whole` writes it, `plain` reads it.
+//! [`WholePublisher`] writes only that.
 
 mod assembly;
 mod bits;
@@ -19,13 +20,13 @@ mod inbox;
 mod member;
 mod plain;
 mod publisher;
-mod raw;
 mod receiver;
 mod sender;
 mod subscription;
 #[cfg(test)]
 mod tests;
 mod topic;
+mod watchers;
 mod whole;
 mod window;
 mod wire;
@@ -36,3 +37,4 @@ pub use inbox::Delivery;
 pub use publisher::{BulkPublisher, PublisherStats};
 pub use sender::Mode;
 pub use subscription::{BulkSubscription, SubscriptionStats};
+pub use watchers::WholePublisher;

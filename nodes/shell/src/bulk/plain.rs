@@ -4,8 +4,8 @@
 use super::error::BulkError;
 use super::graph::{dds_name, outside_writer, writes_tiles};
 use super::inbox::Inbox;
-use super::raw::{Raw, RawAdapter};
 use super::topic::{refused, start};
+use crate::dds::{Raw, RawAdapter};
 use futures::StreamExt;
 use ros2_client::MessageTypeName;
 use rustdds::dds::CreateResult;
@@ -110,7 +110,7 @@ impl Run {
     }
 
     fn put(&mut self, message: Raw) {
-        if self.inbox.press_in(message.0) {
+        if self.inbox.press_in(message.message()) {
             self.lost += 1;
             tracing::warn!(
                 "{}: {} whole messages came faster than they were taken, and are lost",

@@ -4,8 +4,8 @@ use super::error::BulkError;
 use super::graph::{dds_name, outside_readers};
 use super::host::receive_buffer_limit;
 use super::inbox::{Closed, Delivery, Inbox};
-use super::raw::{Raw, RawAdapter};
 use super::topic::{refused, start};
+use crate::dds::{Raw, RawAdapter};
 use bytes::Bytes;
 use ros2_client::MessageTypeName;
 use rustdds::dds::CreateResult;
@@ -106,7 +106,7 @@ impl Run {
         }
         if message.len() > self.largest {
             self.tell_too_large(message.len(), readers);
-        } else if let Err(error) = self.writer.write(Raw(message), None) {
+        } else if let Err(error) = self.writer.write(Raw::of_message(&message), None) {
             self.lost += 1;
             tracing::warn!("{}: {} whole messages not sent: {error}", self.topic, self.lost);
         }

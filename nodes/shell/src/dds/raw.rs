@@ -1,9 +1,12 @@
 //! Samples as bytes: serialisation happens in one place, and services may put a header in front.
 
-use bytes::Bytes;
+use bytes::{BufMut, Bytes, BytesMut};
 use rustdds::{GUID, RepresentationIdentifier, SampleIdentity, no_key};
 use serde::{Serialize, de::DeserializeOwned};
 use std::convert::Infallible;
+
+/// Bytes of the encapsulation header.
+const HEADER: usize = 4;
 
 /// The bytes of a sample, without the encapsulation header, and their byte order.
 #[derive(Clone, Debug)]
@@ -29,6 +32,21 @@ impl Sample {
 }
 
 impl Raw {
+    /// Of a message with its encapsulation header, as bags store it and tiles carry it: little-endian CDR.
+    pub fn of_message(message: &Bytes) -> Raw {
+        let body = message.slice(HEADER.min(message.len())..);
+        Raw { body, encoding: RepresentationIdentifier::CDR_LE }
+    }
+
+    /// The message with its encapsulation header.
+    pub fn message(&self) -> Bytes {
+        let mut bytes = BytesMut::with_capacity(HEADER + self.body.len());
+        bytes.put_slice(&self.encoding.to_bytes());
+        bytes.put_slice(&[0, 0]);
+        bytes.put_slice(&self.body);
+        bytes.freeze()
+    }
+
     pub fn decode<M: DeserializeOwned>(&self) -> Result<M, String> {
         rustdds::serialization::deserialize_from_cdr_with_rep_id(&self.body, self.encoding)
             .map(|(message, _)| message)

@@ -6,6 +6,7 @@ use crate::failure::usage;
 use crate::table::Report;
 use anyhow::{Result, bail};
 use clap::Args;
+use puffer_shell::domain;
 use serde_json::{Value, json};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
@@ -66,7 +67,7 @@ impl Transport {
         if self.size < 16 || self.count == 0 || self.readers == 0 {
             return Err(usage("--size: at least 16; --count and --readers: at least 1"));
         }
-        let domain = self.domain.map_or_else(free_domain, Ok)?;
+        let domain = self.domain.map_or_else(domain::free, Ok)?;
         let mut report = Report::default();
         self.stream(domain, &mut report)?;
         if self.late_joiner {
@@ -288,19 +289,4 @@ fn wait_until_ready(events: &Receiver<Event>, all: usize, deadline: Instant) -> 
     buffers.sort_unstable();
     buffers.dedup();
     Ok(buffers)
-}
-
-/// A domain whose first participant's port nobody has taken.
-fn free_domain() -> Result<u16> {
-    let first = 1 + std::process::id() as u16 % 200;
-    let free = |domain: &u16| {
-        // RTPS 9.6.1.1: discovery of participant 0 by unicast.
-        std::net::UdpSocket::bind(("0.0.0.0", 7410 + 250 * domain)).is_ok()
-    };
-    match (first..=200).chain(1..first).find(free) {
-        Some(domain) => Ok(domain),
-        None => {
-            bail!("no free DDS domain from 1 to 200; end what uses them, or name one with --domain")
-        }
-    }
 }

@@ -1,11 +1,10 @@
 //! Checks of sockets, domain and discovery.
 
 use super::{Check, Finding};
-use crate::fleet::domain;
 use anyhow::{Context, Result};
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerRequest, TriggerResponse};
 use puffer_shell::bulk::{receive_buffer, receive_buffer_limit};
-use puffer_shell::{NoParams, Node, RosArgs, Stop};
+use puffer_shell::{NoParams, Node, RosArgs, Stop, domain};
 use std::net::{Ipv4Addr, UdpSocket};
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,8 @@
-//! A DDS domain that nobody uses.
+//! DDS domains, and which of them nobody uses.
 
 use anyhow::{Result, bail};
 use std::net::UdpSocket;
+use std::sync::atomic::{AtomicU16, Ordering};
 
 /// Domains that are tried; low ones are people's own.
 const DOMAINS: std::ops::RangeInclusive<u16> = 101..=230;
@@ -19,12 +20,12 @@ fn ports(domain: u16) -> impl Iterator<Item = u16> {
 }
 
 /// Whether no socket on this machine is bound to a port of the domain.
-pub(crate) fn is_free(domain: u16) -> bool {
+pub fn is_free(domain: u16) -> bool {
     ports(domain).all(|port| UdpSocket::bind(("0.0.0.0", port)).is_ok())
 }
 
 /// How many more participants of this machine have room on the domain, and how many it has room for at all.
-pub(crate) fn free_participants(domain: u16) -> (usize, usize) {
+pub fn free_participants(domain: u16) -> (usize, usize) {
     let base = 7400 + 250 * domain;
     // Beyond, a participant's ports are those of the next domain.
     let ports = (0..MOST_PARTICIPANTS).filter_map(|p| base.checked_add(11 + 2 * p));
@@ -35,15 +36,20 @@ pub(crate) fn free_participants(domain: u16) -> (usize, usize) {
     (ports.iter().filter(|port| is_free(port)).count(), ports.len())
 }
 
-/// A free domain. Which one is tried first depends on the process, so that two runs that begin at once do not meet.
+/// A free domain, for a run or a test of its own: another one at each call in this process. Which one is tried first
+/// depends on the process, so that two that begin at once do not meet.
 ///
 /// # Errors
 /// All are in use.
-pub(crate) fn free() -> Result<u16> {
+pub fn free() -> Result<u16> {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
     let count = DOMAINS.end() - DOMAINS.start() + 1;
     let first = (std::process::id() % u32::from(count)) as u16;
-    let tried = (0..count).map(|i| DOMAINS.start() + (first + 7 * i) % count);
-    match tried.into_iter().find(|domain| is_free(*domain)) {
+    let next = |_| {
+        let step = NEXT.fetch_add(1, Ordering::Relaxed) % count;
+        DOMAINS.start() + (first + 7 * step) % count
+    };
+    match (0..count).map(next).find(|domain| is_free(*domain)) {
         Some(domain) => Ok(domain),
         None => bail!("no DDS domain from {} to {} is free", DOMAINS.start(), DOMAINS.end()),
     }
@@ -56,6 +62,7 @@ mod tests {
     #[test]
     fn a_domain_in_use_is_not_free() {
         let domain = free().unwrap();
+        assert_ne!(free().unwrap(), domain);
         let socket = UdpSocket::bind(("0.0.0.0", 7400 + 250 * domain + 11)).unwrap();
         assert!(!is_free(domain));
         drop(socket);
