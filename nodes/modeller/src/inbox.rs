@@ -1,15 +1,18 @@
 //! Registered scans as they arrive.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow};
 use puffer_msgs::msg::RegisteredScan;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use tokio::sync::Notify;
 
 /// The newest version of each scan.
 #[derive(Default)]
 pub(crate) struct Inbox {
     state: Mutex<Held>,
+    /// A scan came.
+    came: Notify,
 }
 
 #[derive(Default)]
@@ -25,6 +28,8 @@ impl Inbox {
         held.new.retain(|id| *id != scan.id);
         held.new.push(scan.id);
         held.scans.insert(scan.id, scan);
+        drop(held);
+        self.came.notify_waiters();
     }
 
     /// Forgets all.
@@ -39,20 +44,26 @@ impl Inbox {
 
     /// Waits for scan `id`; a copy of it without its points.
     pub(crate) async fn wait_for(&self, id: u32, deadline: Duration) -> Result<RegisteredScan> {
-        let since = Instant::now();
+        tokio::time::timeout(deadline, self.arrival(id)).await.map_err(|_| {
+            anyhow!(
+                "no registered_scan with id {id} within {:.0} s: does scan_registrar run, and does tf reach the \
+                 sensor's frame?",
+                deadline.as_secs_f64()
+            )
+        })
+    }
+
+    async fn arrival(&self, id: u32) -> RegisteredScan {
         loop {
-            if let Some(scan) = self.lock().scans.get(&id) {
-                let cloud = puffer_msgs::sensor_msgs::msg::PointCloud2::default();
-                return Ok(RegisteredScan { cloud, ..scan.clone() });
+            // It hears of what comes from here on, before the look.
+            let came = self.came.notified();
+            if let Some(scan) = self.lock().scans.get_mut(&id) {
+                let cloud = std::mem::take(&mut scan.cloud);
+                let bare = scan.clone();
+                scan.cloud = cloud;
+                return bare;
             }
-            if since.elapsed() > deadline {
-                bail!(
-                    "no registered_scan with id {id} within {:.0} s: does scan_registrar run, and does tf reach the \
-                     sensor's frame?",
-                    deadline.as_secs_f64()
-                );
-            }
-            tokio::time::sleep(Duration::from_millis(10)).await;
+            came.await;
         }
     }
 
@@ -74,5 +85,28 @@ impl Inbox {
     fn lock(&self) -> MutexGuard<'_, Held> {
         // A panic elsewhere does not make the scans wrong.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    #[tokio::test]
+    async fn whoever_waits_hears_of_its_scan_and_a_deadline_names_it() {
+        let inbox = Arc::new(Inbox::default());
+        let waiting = tokio::spawn({
+            let inbox = Arc::clone(&inbox);
+            async move { inbox.wait_for(1, Duration::from_secs(60)).await }
+        });
+        tokio::task::yield_now().await;
+        for id in [0, 1] {
+            inbox.put(RegisteredScan { id, ..RegisteredScan::default() });
+        }
+        assert_eq!(waiting.await.unwrap().unwrap().id, 1);
+        assert_eq!(inbox.wait_for(0, Duration::ZERO).await.unwrap().id, 0);
+        let error = inbox.wait_for(2, Duration::from_millis(1)).await.unwrap_err().to_string();
+        assert!(error.contains("id 2"), "{error}");
     }
 }
