@@ -1,5 +1,6 @@
 //! The modelling loop as a pure state machine (Wiedemann 2014, §2): plan a view, move, scan, register,
-//! and again, until no view is left; then refine all poses, filter, reconstruct.
+//! and again, until no view is left; then refine all poses, filter, reconstruct. While the mesh is less certain than
+//! wanted, views are planned for twice the points and more, and the mesh is made again.
 //!
 //! [`step`] takes the state and an event and gives the next state and what is to be done. It knows no clock and no
 //! ROS: whoever runs it carries the commands out and reports what came of them.
@@ -13,6 +14,8 @@ crate::params! {
         max_scans: usize = 60, in [1, 10000];
         /// Share of the known surface that must hold its measurements; 1 ends only when no view is left.
         coverage: f64 = 1.0, in [0.0, 1.0];
+        /// Mean standard deviation of the mesh that is to be reached with more scans; 0: what the scans give.
+        sigma: f64 = 0.0, in [0.0, 1.0], unit "m";
         /// Moves that may fail in a row before the loop goes on to the mesh.
         max_failed_moves: usize = 3, in [1, 100];
         /// Scans that may fail in a row before the loop goes on to the mesh.
@@ -72,8 +75,13 @@ pub enum Event {
     Scanned,
     /// The registrar's verdict on the scan.
     Registered(Status),
-    /// The current command succeeded (refine, filter, reconstruct).
+    /// The current command succeeded (refine, filter).
     Finished,
+    /// The mesh is made.
+    Reconstructed {
+        /// Mean standard deviation of its vertices, metres.
+        sigma: f64,
+    },
     /// The current command failed; why.
     Failed(String),
     /// The operator wants to hold before the next motion.
@@ -91,6 +99,8 @@ pub enum Command {
     Plan {
         /// Number of scans.
         scans: usize,
+        /// How many times the points that are configured a surface voxel needs.
+        factor: usize,
     },
     /// Move to the planned view.
     Move,
@@ -146,10 +156,27 @@ pub struct State {
     pub expected_gain: f64,
     /// Why no more scans are taken, once that is so.
     pub reason: String,
+    /// How many times the points that are configured a surface voxel needs.
+    factor: usize,
+    mesh: Option<Made>,
+    /// Whether more scans may make the mesh more certain.
+    may_go_on: bool,
     failed_moves: usize,
     failed_scans: usize,
     unplaced: usize,
     pause_wanted: bool,
+}
+
+/// Points a surface voxel is to hold at most, times those configured, for a mesh that is not certain enough.
+const MOST_POINTS: usize = 16;
+
+/// A mesh that was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Made {
+    /// Of so many scans.
+    scans: usize,
+    /// Mean standard deviation, metres.
+    sigma: f64,
 }
 
 impl State {
@@ -163,6 +190,9 @@ impl State {
             coverage: 0.0,
             expected_gain: 0.0,
             reason: String::new(),
+            factor: 1,
+            mesh: None,
+            may_go_on: false,
             failed_moves: 0,
             failed_scans: 0,
             unplaced: 0,
@@ -200,7 +230,12 @@ impl State {
             (Phase::Moving, event) => self.moved(event),
             (Phase::Scanning, event) => self.scanned(event),
             (Phase::Registering, event) => self.registered(event),
-            (phase, Event::Failed(why)) => Some(self.end(Outcome::Failed(phase, why))),
+            (phase, Event::Failed(why)) => Some(match self.mesh {
+                Some(Made { scans, .. }) => self.give_up(&format!(
+                    "the mesh is that of {scans} scans, {phase:?} failed: {why}"
+                )),
+                None => self.end(Outcome::Failed(phase, why)),
+            }),
             (Phase::Refining, Event::Finished) => {
                 self.phase = Phase::Filtering;
                 Some(Command::Filter { scans: self.scans })
@@ -209,8 +244,9 @@ impl State {
                 self.phase = Phase::Reconstructing;
                 Some(Command::Reconstruct)
             }
-            (Phase::Reconstructing, Event::Finished) => {
-                Some(self.end(Outcome::Modelled(self.reason.clone())))
+            (Phase::Reconstructing, Event::Reconstructed { sigma }) => {
+                self.mesh = Some(Made { scans: self.scans, sigma });
+                Some(self.judge(sigma))
             }
             _ => None,
         }
@@ -219,17 +255,17 @@ impl State {
     fn planned(&mut self, event: Event) -> Option<Command> {
         match event {
             Event::Planned { coverage, gain } => {
-                (self.coverage, self.expected_gain) = (coverage, gain);
+                self.note(coverage, gain);
                 if self.scans > 0 && self.params.coverage < 1.0 && coverage >= self.params.coverage
                 {
-                    return Some(self.finish("the coverage asked for is reached"));
+                    return Some(self.enough("the coverage asked for is reached"));
                 }
                 self.phase = Phase::Moving;
                 Some(Command::Move)
             }
             Event::NothingLeft { coverage, reason } => {
-                (self.coverage, self.expected_gain) = (coverage, 0.0);
-                Some(self.finish(&reason))
+                self.note(coverage, 0.0);
+                Some(self.enough(&reason))
             }
             Event::Failed(why) => Some(self.finish(&format!("planning failed: {why}"))),
             _ => None,
@@ -306,12 +342,62 @@ impl State {
             return Command::Hold;
         }
         self.phase = Phase::Planning;
-        Command::Plan { scans: self.scans }
+        Command::Plan { scans: self.scans, factor: self.factor }
+    }
+
+    fn note(&mut self, coverage: f64, gain: f64) {
+        self.expected_gain = gain;
+        // A share of more points than are configured is no coverage.
+        if self.factor == 1 {
+            self.coverage = coverage;
+        }
+    }
+
+    /// Scans show what they were to show: a mesh of them, or more of them if there is one that is not certain enough.
+    fn enough(&mut self, reason: &str) -> Command {
+        if self.mesh.is_some_and(|made| made.scans == self.scans) {
+            self.ask_for_more(reason)
+        } else {
+            let command = self.finish(reason);
+            self.may_go_on = true;
+            command
+        }
+    }
+
+    /// What follows from a mesh with this mean sigma, metres.
+    fn judge(&mut self, sigma: f64) -> Command {
+        if self.params.sigma == 0.0 || sigma <= self.params.sigma {
+            return self.end(Outcome::Modelled(self.reason.clone()));
+        }
+        let reason = self.reason.clone();
+        if self.may_go_on { self.ask_for_more(&reason) } else { self.give_up(&reason) }
+    }
+
+    fn ask_for_more(&mut self, reason: &str) -> Command {
+        if self.factor >= MOST_POINTS {
+            return self.give_up(reason);
+        }
+        self.factor *= 2;
+        self.may_go_on = false;
+        self.plan()
+    }
+
+    /// Ends with the mesh that there is.
+    fn give_up(&mut self, reason: &str) -> Command {
+        let wanted = self.params.sigma * 1e3;
+        let reached = self.mesh.map_or(f64::NAN, |made| made.sigma * 1e3);
+        self.reason =
+            format!("{reason}; the mean sigma is {reached:.3} mm, {wanted:.3} mm was not reached");
+        self.end(Outcome::Modelled(self.reason.clone()))
     }
 
     /// Goes on to the mesh with what was measured.
     fn finish(&mut self, reason: &str) -> Command {
+        if self.mesh.is_some_and(|made| made.scans == self.scans) {
+            return self.give_up(reason);
+        }
         self.reason = reason.to_owned();
+        self.may_go_on = false;
         if self.accepted == 0 {
             let phase = self.phase;
             return self

@@ -28,15 +28,15 @@ fn a_run_goes_from_the_first_view_to_the_mesh() {
         Event::NothingLeft { coverage: 0.97, reason: "no view is left".into() },
         Event::Finished,
         Event::Finished,
-        Event::Finished,
+        Event::Reconstructed { sigma: 1e-4 },
     ]);
     let (state, commands) = run(SessionParams::default(), &events);
     let expected = [
-        Command::Plan { scans: 0 },
+        Command::Plan { scans: 0, factor: 1 },
         Command::Move,
         Command::Scan,
         Command::AwaitVerdict { index: 0 },
-        Command::Plan { scans: 1 },
+        Command::Plan { scans: 1, factor: 1 },
         Command::Refine { scans: 1 },
         Command::Filter { scans: 1 },
         Command::Reconstruct,
@@ -100,7 +100,7 @@ fn a_pause_holds_before_the_next_plan_and_cancel_ends_anywhere() {
     assert_eq!(state.phase, Phase::Paused);
     assert_eq!(commands.last(), Some(&Some(Command::Hold)));
     let (resumed, command) = step(&state, Event::Resume);
-    assert_eq!(command, Some(Command::Plan { scans: 1 }));
+    assert_eq!(command, Some(Command::Plan { scans: 1, factor: 1 }));
     for state in [state, resumed, State::new(SessionParams::default())] {
         let (state, command) = step(&state, Event::Cancel);
         assert_eq!(command, Some(Command::End(Outcome::Cancelled)));
@@ -114,4 +114,71 @@ fn events_out_of_place_change_nothing() {
     for event in [Event::Moved, Event::Scanned, Event::Finished, planned()] {
         assert_eq!(step(&start, event), (start.clone(), None));
     }
+}
+
+/// From a plan without a view to a mesh with this sigma.
+fn a_mesh(sigma: f64) -> [Event; 4] {
+    [
+        Event::NothingLeft { coverage: 0.9, reason: "no view is left".into() },
+        Event::Finished,
+        Event::Finished,
+        Event::Reconstructed { sigma },
+    ]
+}
+
+#[test]
+fn a_mesh_that_is_not_certain_enough_gets_more_scans() {
+    let params = SessionParams { sigma: 1e-4, ..SessionParams::default() };
+    let mut events = vec![Event::Ready];
+    events.extend(one_scan(Status::Accepted));
+    events.extend(a_mesh(3e-4));
+    let (state, commands) = run(params.clone(), &events);
+    assert_eq!(commands.last(), Some(&Some(Command::Plan { scans: 1, factor: 2 })));
+    assert_eq!(state.coverage, 0.9);
+
+    // Twice the points ask for no view, four times do; the second mesh is good enough.
+    events.push(Event::NothingLeft { coverage: 0.8, reason: "none".into() });
+    events.extend(one_scan(Status::Accepted));
+    events.extend(a_mesh(1e-4));
+    let (state, commands) = run(params, &events);
+    let plans: Vec<_> =
+        commands.iter().flatten().filter(|c| matches!(c, Command::Plan { .. })).collect();
+    let last = |scans, factor| Command::Plan { scans, factor };
+    assert_eq!(plans[2..], [&last(1, 2), &last(1, 4), &last(2, 4)]);
+    let end = Command::End(Outcome::Modelled("no view is left".into()));
+    assert_eq!(commands.last(), Some(&Some(end)));
+    assert_eq!((state.scans, state.coverage), (2, 0.9));
+}
+
+#[test]
+fn a_sigma_out_of_reach_ends_the_run_and_is_told() {
+    let told = |params: SessionParams, events: &[Event], why: &str| {
+        let (_, commands) = run(params, events);
+        let Some(Some(Command::End(Outcome::Modelled(reason)))) = commands.last() else {
+            panic!("{commands:?}");
+        };
+        let sigma = "the mean sigma is 0.300 mm, 0.100 mm was not reached";
+        assert!(reason.contains(why) && reason.contains(sigma), "{reason}");
+    };
+    let params = SessionParams { sigma: 1e-4, ..SessionParams::default() };
+    let mut events = vec![Event::Ready];
+    events.extend(one_scan(Status::Accepted));
+    let first = events.clone();
+    events.extend(a_mesh(3e-4));
+    let nothing = || Event::NothingLeft { coverage: 0.8, reason: "really none".into() };
+    // No view whatever is asked for: 2, 4, 8, 16 times the points.
+    let mut none = events.clone();
+    none.extend([nothing(), nothing(), nothing(), nothing()]);
+    told(params.clone(), &none, "really none");
+    // No more scans are allowed.
+    let mut full = first;
+    full.extend_from_slice(&a_mesh(3e-4)[1..]);
+    told(SessionParams { max_scans: 1, ..params.clone() }, &full, "number of scans");
+    // What fails behind the first mesh leaves that.
+    let mut broken = events.clone();
+    broken.push(Event::Failed("no planner".into()));
+    told(params.clone(), &broken, "no planner");
+    events.extend(one_scan(Status::Accepted));
+    events.extend([nothing(), Event::Failed("no memory".into())]);
+    told(params, &events, "the mesh is that of 1 scans, Refining failed: no memory");
 }

@@ -1,8 +1,9 @@
 //! Filtered cloud to a watertight mesh.
 //!
 //! Takes `filtered_cloud`; makes a mesh on `~/reconstruct` (for scripts) or `~/reconstruct_action` (with progress),
-//! writes it and publishes `model_mesh` (latched). Also takes scan folders, bags and clouds from files.
+//! writes it and publishes `model_mesh` and `model_marker` (latched). Also takes scan folders, bags and clouds from files.
 
+mod marker;
 mod params;
 mod paths;
 mod serve;

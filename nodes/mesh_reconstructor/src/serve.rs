@@ -1,6 +1,7 @@
 //! The services and the action.
 
-use crate::work::{Made, failure, make};
+use crate::marker::mesh_marker;
+use crate::work::{Made, failure, make, within_region};
 use crate::{Desk, Params, paths};
 use anyhow::Result;
 use puffer_core::Progress;
@@ -10,13 +11,15 @@ use puffer_msgs::action::{
     ReconstructMesh, ReconstructMeshFeedback, ReconstructMeshGoal, ReconstructMeshResult,
 };
 use puffer_msgs::builtin_interfaces::msg::Time;
+use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::msg::ModelMesh;
 use puffer_msgs::srv::{
     Reconstruct, ReconstructRequest, ReconstructResponse, SaveMesh, SaveMeshRequest,
     SaveMeshResponse,
 };
 use puffer_msgs::std_msgs::msg::Header;
-use puffer_shell::bulk::{BulkPublisher, Mode};
+use puffer_msgs::visualization_msgs::msg::Marker;
+use puffer_shell::bulk::{BulkPublisher, Mode, WholePublisher};
 use puffer_shell::convert::mesh_message;
 use puffer_shell::{Goal, Node, Outcome};
 use std::sync::Arc;
@@ -34,8 +37,18 @@ struct Counter {
     node: Node<Params>,
     desk: Arc<Mutex<Desk>>,
     meshes: BulkPublisher,
+    markers: WholePublisher<Marker>,
     /// One reconstruction at a time: each takes all cores.
     turn: Mutex<()>,
+}
+
+/// Which measurements a mesh is made of; none of it counts for inputs from files.
+#[derive(Default)]
+struct Wanted {
+    /// The cloud's; empty: any.
+    cloud_hash: String,
+    /// Edges of the region of interest, as in `ReconstructMesh.action`.
+    roi: Vector3,
 }
 
 pub(crate) fn all(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
@@ -43,12 +56,13 @@ pub(crate) fn all(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
         node: node.clone(),
         desk: Arc::clone(desk),
         meshes: node.bulk_publisher_for_all::<ModelMesh>("model_mesh", Mode::Latched)?,
+        markers: node.whole_publisher("model_marker")?,
         turn: Mutex::new(()),
     });
     let at = Arc::clone(&counter);
     node.serve::<Reconstruct, _, _>("~/reconstruct", move |request: ReconstructRequest| {
         let at = Arc::clone(&at);
-        async move { at.reconstruct(&request, "", &Progress::silent()).await }
+        async move { at.reconstruct(&request, &Wanted::default(), &Progress::silent()).await }
     })?;
     let at = Arc::clone(&counter);
     node.action_server::<ReconstructMesh, _, _, _>(
@@ -69,17 +83,19 @@ impl Counter {
     async fn reconstruct(
         &self,
         request: &ReconstructRequest,
-        cloud_hash: &str,
+        wanted: &Wanted,
         progress: &Progress,
     ) -> ReconstructResponse {
         let _turn = self.turn.lock().await;
-        if let Err(response) = self.wait_for_cloud(cloud_hash).await {
+        if let Err(response) = self.wait_for_cloud(&wanted.cloud_hash).await {
             return *response;
         }
         let cloud = self.desk.lock().await.cloud.as_ref().map(|(cloud, _)| Arc::clone(cloud));
         let params = self.node.params();
-        let made =
-            tokio::task::block_in_place(|| make(request, cloud.as_deref(), &params, progress));
+        let made = tokio::task::block_in_place(|| {
+            let cloud = cloud.map(|cloud| within_region(cloud, &wanted.roi)).transpose()?;
+            make(request, cloud.as_deref(), &params, progress)
+        });
         let Made { mesh, response } = match made {
             Ok(made) => made,
             Err(response) => {
@@ -93,7 +109,11 @@ impl Counter {
         };
         let (sec, nanosec) = self.node.now().parts();
         let frame_id = params.scan.object_frame;
-        let message = mesh_message(&mesh, Header { stamp: Time { sec, nanosec }, frame_id });
+        let header = Header { stamp: Time { sec, nanosec }, frame_id };
+        if let Err(error) = self.markers.publish(&mesh_marker(&mesh, header.clone())) {
+            tracing::warn!("{error}");
+        }
+        let message = mesh_message(&mesh, header);
         if let Err(error) = self.meshes.publish_message(&message).await {
             tracing::error!("the mesh is written, but not published: {error}");
         } else if let Err(error) = self.meshes.flush(FLUSH_DEADLINE).await {
@@ -153,7 +173,8 @@ impl Counter {
             output_path: asked.output_path.clone(),
             edge_length: asked.edge_length,
         };
-        let response = self.reconstruct(&request, &asked.cloud_hash, &progress).await;
+        let wanted = Wanted { cloud_hash: asked.cloud_hash.clone(), roi: asked.roi.clone() };
+        let response = self.reconstruct(&request, &wanted, &progress).await;
         watch.abort();
         let (success, code) = (response.success, response.error_code);
         let result = as_result(response);

@@ -1,16 +1,19 @@
 //! From a cloud or an input file to a mesh file.
 
 use crate::{Params, paths};
-use puffer_core::geometry::Cloud;
+use puffer_core::geometry::{Aabb, Cloud, Vec3};
 use puffer_core::mesh::io::{Unit, write_mesh};
 use puffer_core::mesh::{Mesh, genus, is_closed, is_oriented, is_two_manifold};
 use puffer_core::pipeline::{self, Poses, comments};
 use puffer_core::reconstruct::reconstruct;
 use puffer_core::scans::ScanSource;
 use puffer_core::{Error, Progress};
+use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::srv::{ReconstructRequest, ReconstructResponse};
+use puffer_shell::convert::region_from_message;
 use puffer_shell::scans::{RegistrarParams, is_bag, scans_of_bag};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The codes of `Reconstruct.srv`.
@@ -60,6 +63,25 @@ pub(crate) fn make(
     response.mesh_path = path.display().to_string();
     response.seconds = since.elapsed().as_secs_f32();
     Ok(Made { mesh, response })
+}
+
+/// What of a cloud lies within the region of interest; all of it if its edges are 0.
+///
+/// # Errors
+/// The response that says that the region is none.
+pub(crate) fn within_region(
+    cloud: Arc<Cloud>,
+    roi: &Vector3,
+) -> Result<Arc<Cloud>, Box<ReconstructResponse>> {
+    let everywhere =
+        Aabb { min: Vec3::repeat(f64::NEG_INFINITY), max: Vec3::repeat(f64::INFINITY) };
+    let region =
+        region_from_message(roi, &everywhere).map_err(|text| failure(Codes::BAD_INPUT, text))?;
+    if region == everywhere {
+        return Ok(cloud);
+    }
+    let inside = (0..cloud.len()).filter(|&i| region.contains(&cloud.points[i]));
+    Ok(Arc::new(cloud.select(&inside.collect::<Vec<_>>())))
 }
 
 fn from_file(
@@ -118,4 +140,24 @@ fn of_error(error: Error) -> Box<ReconstructResponse> {
         }
     };
     failure(code, error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_beyond_the_region_are_left_out() {
+        let mut cloud = Cloud::default();
+        for (x, z) in [(0.0, 0.1), (0.09, 0.1), (0.11, 0.1), (0.0, 0.4), (0.0, -0.02)] {
+            cloud.push(Vec3::new(x, 0.0, z), Vec3::z(), 1e-4, 1);
+        }
+        let cloud = Arc::new(cloud);
+        let all = within_region(Arc::clone(&cloud), &Vector3::default()).unwrap();
+        assert!(Arc::ptr_eq(&all, &cloud));
+        let some = within_region(Arc::clone(&cloud), &Vector3 { x: 0.2, y: 0.0, z: 0.3 }).unwrap();
+        assert_eq!(some.points, [cloud.points[0], cloud.points[1], cloud.points[4]]);
+        let wrong = within_region(cloud, &Vector3 { x: -1.0, y: 0.0, z: 0.0 }).err().unwrap();
+        assert_eq!(wrong.error_code, Codes::BAD_INPUT);
+    }
 }

@@ -3,6 +3,7 @@
 use crate::Params;
 use crate::goal::Modeller;
 use anyhow::{Result, anyhow, bail};
+use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::Node;
 use std::sync::Arc;
@@ -46,7 +47,8 @@ impl Modeller {
         let refined = self.partners.refine(self.inbox.len(), &stop).await?;
         // Scans that came meanwhile are not in the revision, but must not be missed by the filter either.
         let filtered = self.partners.filter(self.inbox.len(), refined.revision).await?;
-        let mesh = self.partners.reconstruct(&filtered.cloud_hash, &stop).await?;
+        let mesh =
+            self.partners.reconstruct(&filtered.cloud_hash, &Vector3::default(), &stop).await?;
         if !mesh.success {
             return Err(anyhow!(mesh.error_msg));
         }

@@ -6,11 +6,13 @@ use crate::journal::Journal;
 use crate::partners::Partners;
 use crate::runner::{End, Runner, phase_constant};
 use anyhow::Result;
+use puffer_core::geometry::Aabb;
 use puffer_core::session::{Event, Outcome as Ended, Phase, SessionParams, State};
 use puffer_msgs::action::{ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult};
 use puffer_msgs::builtin_interfaces::msg::{Duration as DurationMessage, Time};
 use puffer_msgs::msg::ModellingStatus;
 use puffer_msgs::std_msgs::msg::Header;
+use puffer_shell::convert::region_from_message;
 use puffer_shell::{Goal, Node, Outcome, Publisher};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -86,7 +88,8 @@ impl Modeller {
         }
         self.inbox.clear();
         let journal = Journal::begin(&params, self.node.now())?;
-        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal);
+        let roi = goal.request().roi.clone();
+        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, roi);
         let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
         let end = runner.run(session(&params, goal.request()), first, controls, told).await;
         runner.report(&end)?;
@@ -104,6 +107,7 @@ impl Modeller {
             run_folder: runner.journal.folder(),
             scans: end.state.scans as u32,
             coverage: end.state.coverage as f32,
+            reason: end.state.reason.clone(),
             ..ModelObjectResult::default()
         };
         Ok((end, result))
@@ -144,7 +148,22 @@ fn session(params: &Params, goal: &ModelObjectGoal) -> SessionParams {
     if goal.coverage > 0.0 {
         session.coverage = f64::from(goal.coverage).min(1.0);
     }
+    if goal.sigma > 0.0 {
+        session.sigma = f64::from(goal.sigma);
+    }
     session
+}
+
+/// What is wrong with a goal, in words.
+pub(crate) fn check(goal: &ModelObjectGoal) -> std::result::Result<(), String> {
+    for (name, value) in [("coverage", goal.coverage), ("sigma", goal.sigma)] {
+        if !value.is_finite() || value < 0.0 {
+            return Err(format!(
+                "{name} is {value}: it must be positive, or 0 for what is configured"
+            ));
+        }
+    }
+    region_from_message(&goal.roi, &Aabb::EMPTY).map(drop)
 }
 
 fn finished(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResult> {

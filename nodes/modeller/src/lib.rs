@@ -67,7 +67,8 @@ fn serve_goals(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()> {
     let (asked, modeller) = (Arc::clone(modeller), Arc::clone(modeller));
     node.action_server::<ModelObject, _, _, _>(
         "model_object",
-        move |_: &ModelObjectGoal| {
+        move |goal: &ModelObjectGoal| {
+            goal::check(goal)?;
             if asked.is_busy() {
                 Err("another object is being modelled".to_owned())
             } else {

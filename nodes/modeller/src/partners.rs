@@ -6,6 +6,7 @@ use puffer_msgs::action::{
     ReconstructMesh, ReconstructMeshGoal, ReconstructMeshResult, Refine, RefineGoal, RefineResult,
 };
 use puffer_msgs::control_msgs::action::{FollowJointTrajectory, FollowJointTrajectoryGoal};
+use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::srv::{
     Filter, FilterRequest, FilterResponse, PlanView, PlanViewRequest, PlanViewResponse,
 };
@@ -116,9 +117,8 @@ impl Partners {
         Ok(())
     }
 
-    pub(crate) async fn plan(&self, scans: usize) -> Result<PlanViewResponse> {
-        let request = PlanViewRequest { scans: scans as u32, ..PlanViewRequest::default() };
-        let response = self.plan.call(&request, self.deadline(|p| p.plan_deadline)).await?;
+    pub(crate) async fn plan(&self, request: &PlanViewRequest) -> Result<PlanViewResponse> {
+        let response = self.plan.call(request, self.deadline(|p| p.plan_deadline)).await?;
         if !response.success {
             bail!("{}", response.message);
         }
@@ -174,11 +174,13 @@ impl Partners {
     pub(crate) async fn reconstruct(
         &self,
         cloud_hash: &str,
+        roi: &Vector3,
         stop: &Stop,
     ) -> Result<ReconstructMeshResult> {
         let goal = ReconstructMeshGoal {
             output_path: self.node.params().modeller.mesh_path,
             cloud_hash: cloud_hash.to_owned(),
+            roi: roi.clone(),
             ..ReconstructMeshGoal::default()
         };
         let handle = send(&self.reconstruct, &goal).await?;

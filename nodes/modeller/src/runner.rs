@@ -7,6 +7,8 @@ use crate::partners::Partners;
 use anyhow::{Result, anyhow};
 use puffer_core::session::{Command, Event, Outcome, Phase, SessionParams, State, step};
 use puffer_msgs::action::ReconstructMeshResult;
+use puffer_msgs::geometry_msgs::msg::Vector3;
+use puffer_msgs::srv::PlanViewRequest;
 use puffer_msgs::trajectory_msgs::msg::JointTrajectory;
 use puffer_shell::convert::status_from_message;
 use puffer_shell::{Node, Stop};
@@ -22,6 +24,8 @@ pub(crate) struct Runner<'a> {
     pub journal: Journal,
     /// The way to the planned view.
     trajectory: JointTrajectory,
+    /// Edges of the region of interest, as the goal has them.
+    roi: Vector3,
     revision: u32,
     cloud_hash: String,
     pub mesh: ReconstructMeshResult,
@@ -39,6 +43,7 @@ impl<'a> Runner<'a> {
         partners: &'a Partners,
         inbox: &'a Inbox,
         journal: Journal,
+        roi: Vector3,
     ) -> Runner<'a> {
         Runner {
             node,
@@ -46,6 +51,7 @@ impl<'a> Runner<'a> {
             inbox,
             journal,
             trajectory: JointTrajectory::default(),
+            roi,
             revision: 0,
             cloud_hash: String::new(),
             mesh: ReconstructMeshResult::default(),
@@ -119,7 +125,7 @@ impl<'a> Runner<'a> {
     async fn carry_out(&mut self, command: &Command, stop: &Stop) -> Event {
         let (stage, since) = (stage_of(command), Instant::now());
         let result = match command {
-            Command::Plan { scans } => self.plan(*scans).await,
+            Command::Plan { scans, factor } => self.plan(*scans, *factor).await,
             Command::Move => self.drive(stop).await,
             Command::Scan => self.partners.trigger().await.map(|()| Event::Scanned),
             Command::AwaitVerdict { index } => self.verdict(*index).await,
@@ -143,8 +149,15 @@ impl<'a> Runner<'a> {
         })
     }
 
-    async fn plan(&mut self, scans: usize) -> Result<Event> {
-        let plan = self.partners.plan(scans).await?;
+    async fn plan(&mut self, scans: usize, factor: usize) -> Result<Event> {
+        let request = PlanViewRequest {
+            scans: scans as u32,
+            revision: self.revision,
+            point_factor: factor as u32,
+            roi: self.roi.clone(),
+            ..PlanViewRequest::default()
+        };
+        let plan = self.partners.plan(&request).await?;
         self.journal.planned(&plan);
         self.journal.note("planned_at_simulated_seconds", self.node.now().seconds());
         let coverage = f64::from(plan.coverage);
@@ -190,11 +203,12 @@ impl<'a> Runner<'a> {
     }
 
     async fn reconstruct(&mut self, stop: &Stop) -> Result<Event> {
-        self.mesh = self.partners.reconstruct(&self.cloud_hash, stop).await?;
-        if !self.mesh.success {
-            return Err(anyhow!("{}", self.mesh.error_msg));
+        let mesh = self.partners.reconstruct(&self.cloud_hash, &self.roi, stop).await?;
+        if !mesh.success {
+            return Err(anyhow!("{}", mesh.error_msg));
         }
-        Ok(Event::Finished)
+        self.mesh = mesh;
+        Ok(Event::Reconstructed { sigma: f64::from(self.mesh.mean_sigma) })
     }
 
     /// Writes the report of a run that ended.

@@ -10,10 +10,13 @@ use puffer_core::robot::{
     slide_range,
 };
 use puffer_core::scans::Support;
-use puffer_core::view::{Plan, ReachedView, State, ViewSpace, next_view};
+use puffer_core::view::{Plan, ReachedView, State, ViewParams, ViewSpace, next_view};
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::sensor_msgs::msg::JointState;
-use puffer_shell::convert::{pose_from_message, scan_from_message, status_from_message};
+use puffer_msgs::srv::PlanViewRequest;
+use puffer_shell::convert::{
+    pose_from_message, region_from_message, scan_from_message, status_from_message,
+};
 use std::collections::BTreeMap;
 
 /// Before anything was seen, the object is taken to fill a ball of this share of the working distance.
@@ -31,6 +34,19 @@ pub(crate) struct Desk {
     joints: Option<Vec<f64>>,
     /// Whether the space must be made anew because poses have changed.
     stale: bool,
+    /// That of the newest corrected poses, 0 without.
+    revision: u32,
+    /// What the space was made for.
+    aim: Aim,
+}
+
+/// What views are planned for.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Aim {
+    /// The region of interest, object frame, metres.
+    pub region: Aabb,
+    /// Points that a surface voxel needs, times those configured.
+    pub factor: usize,
 }
 
 struct Held {
@@ -50,7 +66,8 @@ pub(crate) struct Answer {
 
 impl Desk {
     pub(crate) fn new(params: Params) -> Result<Desk> {
-        let space = empty_space(&params, None)?;
+        let aim = Aim { region: params.planner.region(), factor: 1 };
+        let space = empty_space(&params, &aim, None)?;
         Ok(Desk {
             params,
             space,
@@ -60,6 +77,8 @@ impl Desk {
             fault: None,
             joints: None,
             stale: false,
+            revision: 0,
+            aim,
         })
     }
 
@@ -74,15 +93,33 @@ impl Desk {
         joints.iter().map(|joint| joint.name.clone()).collect()
     }
 
-    /// What is missing for a plan with `scans` scans, in words.
-    pub(crate) fn missing(&self, scans: usize) -> Option<String> {
+    /// What the space knows.
+    pub(crate) fn space(&self) -> &ViewSpace {
+        &self.space
+    }
+
+    /// What a request asks views for.
+    ///
+    /// # Errors
+    /// A region that is none, in words.
+    pub(crate) fn aim(&self, request: &PlanViewRequest) -> Result<Aim> {
+        let region = region_from_message(&request.roi, &self.params.planner.region())
+            .map_err(anyhow::Error::msg)?;
+        Ok(Aim { region, factor: request.point_factor.max(1) as usize })
+    }
+
+    /// What is missing for a plan with `scans` scans and their poses of this revision, in words.
+    pub(crate) fn missing(&self, scans: usize, revision: u32) -> Option<String> {
         if self.robot.is_none() {
             Some("no robot_description came: start the driver or robot_state_publisher".to_owned())
         } else if self.joints.is_none() {
             Some("no joint_states for all joints of the robot came".to_owned())
+        } else if self.scans.len() < scans {
+            Some(format!("{} of {scans} scans came", self.scans.len()))
         } else {
-            (self.scans.len() < scans)
-                .then(|| format!("{} of {scans} scans came", self.scans.len()))
+            (self.revision < revision).then(|| {
+                format!("corrected poses of revision {} of {revision} came", self.revision)
+            })
         }
     }
 
@@ -146,12 +183,14 @@ impl Desk {
                 held.status = status_from_message(*status).map_err(anyhow::Error::msg)?;
             }
         }
+        self.revision = message.revision;
         self.stale = true;
         Ok(())
     }
 
     /// Plans the next view from the joint positions `start`, or from where the robot stands.
-    pub(crate) fn plan(&mut self, start: &JointState) -> Result<Answer> {
+    pub(crate) fn plan(&mut self, start: &JointState, aim: Aim) -> Result<Answer> {
+        self.aim_at(aim);
         self.refresh()?;
         let workcell = self.robot.as_ref().ok_or_else(|| anyhow!("no robot"))?;
         let start = if start.name.is_empty() {
@@ -200,13 +239,18 @@ impl Desk {
         Ok(Answer { plan, reached, voxel_edge: self.space.edge() })
     }
 
+    fn aim_at(&mut self, aim: Aim) {
+        self.stale |= self.aim != aim;
+        self.aim = aim;
+    }
+
     /// Makes the space anew if poses or the robot have changed.
     fn refresh(&mut self) -> Result<()> {
         if !self.stale {
             return Ok(());
         }
         let robot = self.robot.as_ref().zip(self.joints.as_deref());
-        let mut space = empty_space(&self.params, robot)?;
+        let mut space = empty_space(&self.params, &self.aim, robot)?;
         for held in self.scans.values() {
             if held.status == Status::Accepted {
                 space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
@@ -222,15 +266,23 @@ impl Desk {
     /// Forgets all scans.
     pub(crate) fn reset(&mut self) -> Result<()> {
         self.scans.clear();
+        self.revision = 0;
+        self.aim = Aim { region: self.params.planner.region(), factor: 1 };
         self.stale = true;
         self.refresh()
     }
 }
 
 /// A space in which nothing was seen; what holds the object is set apart.
-fn empty_space(params: &Params, robot: Option<(&Workcell, &[f64])>) -> Result<ViewSpace> {
+fn empty_space(
+    params: &Params,
+    aim: &Aim,
+    robot: Option<(&Workcell, &[f64])>,
+) -> Result<ViewSpace> {
     let planner = &params.planner;
-    let mut space = ViewSpace::new(planner.sensor(), planner.region(), &params.view)?;
+    let min_points = params.view.min_points.saturating_mul(aim.factor);
+    let view = ViewParams { min_points, ..params.view.clone() };
+    let mut space = ViewSpace::new(planner.sensor(), aim.region, &view)?;
     if planner.support == Support::Table {
         space.exclude_below(0.0);
     }
@@ -283,5 +335,36 @@ fn obstacle(space: &ViewSpace, params: &Params) -> Obstacle {
         return Obstacle::of_box(&aabb.padded(space.edge()));
     }
     let radius = UNSEEN_SHARE * params.planner.sensor().working_distance();
-    Obstacle::of_sphere(&params.planner.region().center(), radius)
+    Obstacle::of_sphere(&space.roi().center(), radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use puffer_core::geometry::Vec3;
+    use puffer_msgs::geometry_msgs::msg::Vector3;
+
+    #[test]
+    fn a_request_bounds_what_views_are_planned_for() {
+        let mut desk = Desk::new(Params::default()).unwrap();
+        let configured = desk.params.planner.region();
+        assert_eq!(*desk.space().roi(), configured);
+        let roi = Vector3 { x: 0.1, y: 0.2, z: 0.15 };
+        let request = PlanViewRequest { roi, point_factor: 4, ..PlanViewRequest::default() };
+        let aim = desk.aim(&request).unwrap();
+        assert_eq!(aim.factor, 4);
+        desk.aim_at(aim);
+        desk.refresh().unwrap();
+        let region = *desk.space().roi();
+        assert_eq!(region.min, Vec3::new(-0.05, -0.1, configured.min.z));
+        assert_eq!(region.max, Vec3::new(0.05, 0.1, 0.15));
+        assert!(desk.space().state_at(&Vec3::new(0.06, 0.0, 0.1)).is_none());
+
+        let aim = desk.aim(&PlanViewRequest::default()).unwrap();
+        assert_eq!(aim, Aim { region: configured, factor: 1 });
+        let roi = Vector3 { x: -0.1, y: 0.2, z: 0.15 };
+        let error = desk.aim(&PlanViewRequest { roi, ..PlanViewRequest::default() }).unwrap_err();
+        assert!(error.to_string().contains("roi"), "{error}");
+        assert!(desk.missing(0, 0).is_some(), "the robot is missing");
+    }
 }

@@ -1,16 +1,18 @@
 //! Registered scans and the robot to the next best view.
 //!
 //! Takes `registered_scan`, `registered_poses`, `joint_states` and `robot_description`; answers `~/plan_view` with a
-//! view, the way there, and what was considered.
+//! view, the way there, and what was considered. Whoever watches gets `~/voxels` and `~/candidates` as markers.
 
 mod answer;
 mod desk;
+mod markers;
 mod params;
 
 pub use params::{Params, PlannerParams, SensorChoice};
 
 use anyhow::Result;
 use desk::Desk;
+use markers::Markers;
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::{PlanView, PlanViewRequest, PlanViewResponse};
@@ -36,7 +38,8 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let mut descriptions: Subscription<Text> =
         node.subscribe("robot_description", Profile::LatchedSub)?;
     let desk = Arc::new(Mutex::new(Desk::new(node.params())?));
-    serve_plans(&node, &desk)?;
+    let markers = Arc::new(Markers::new(&node)?);
+    serve_plans(&node, &desk, &markers)?;
     serve_reset(&node, &desk)?;
     tracing::info!("ready");
     loop {
@@ -45,7 +48,9 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
                 scan = scans.next() => {
                     let scan = scan?;
                     let mut desk = desk.lock().await;
-                    tokio::task::block_in_place(|| desk.take(&scan))
+                    tokio::task::block_in_place(|| desk.take(&scan))?;
+                    markers.show_space(desk.space(), node.now());
+                    Ok(())
                 }
                 poses = poses.next() => desk.lock().await.correct(&poses?),
                 Some(state) = joints.next() => {
@@ -66,19 +71,24 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     }
 }
 
-fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
-    let (shared, desk) = (node.clone(), Arc::clone(desk));
+fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>, markers: &Arc<Markers>) -> Result<()> {
+    let (shared, desk, markers) = (node.clone(), Arc::clone(desk), Arc::clone(markers));
     node.serve::<PlanView, _, _>("~/plan_view", move |request: PlanViewRequest| {
-        let (node, desk) = (shared.clone(), Arc::clone(&desk));
+        let (node, desk, markers) = (shared.clone(), Arc::clone(&desk), Arc::clone(&markers));
         async move {
             let deadline = Duration::from_secs_f64(node.params().planner.input_deadline);
-            if let Err(response) = wait_for(&desk, request.scans as usize, deadline).await {
+            if let Err(response) = wait_for(&desk, &request, deadline).await {
                 return *response;
             }
             let mut desk = desk.lock().await;
             let since = Instant::now();
-            match tokio::task::block_in_place(|| desk.plan(&request.start)) {
+            let planned = desk
+                .aim(&request)
+                .and_then(|aim| tokio::task::block_in_place(|| desk.plan(&request.start, aim)));
+            match planned {
                 Ok(planned) => {
+                    markers.show_space(desk.space(), node.now());
+                    markers.show_plan(&planned.plan, node.now());
                     let response = answer::response(&planned, &desk.joint_names());
                     tracing::info!(
                         "{} in {:.2} s: gain {:.0}, coverage {:.1} %{}",
@@ -100,24 +110,25 @@ fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
 /// Waits until all is there that a plan needs.
 async fn wait_for(
     desk: &Mutex<Desk>,
-    scans: usize,
+    request: &PlanViewRequest,
     deadline: Duration,
 ) -> std::result::Result<(), Box<PlanViewResponse>> {
     let since = Instant::now();
+    let scans = request.scans as usize;
     loop {
-        let (fault, missing, there) = {
+        let (fault, missing, without_poses, there) = {
             let desk = desk.lock().await;
-            (desk.fault(), desk.missing(scans), desk.scans())
+            let missing = desk.missing(scans, request.revision);
+            (desk.fault(), missing, desk.missing(scans, 0), desk.scans())
         };
         if let Some(fault) = fault {
             return Err(Box::new(failed(PlanViewResponse::NO_ROBOT, fault)));
         }
         let Some(missing) = missing else { return Ok(()) };
         if since.elapsed() > deadline {
-            let code = if there < scans {
-                PlanViewResponse::SCANS_MISSING
-            } else {
-                PlanViewResponse::NO_ROBOT
+            let code = match (there < scans, without_poses) {
+                (false, Some(_)) => PlanViewResponse::NO_ROBOT,
+                _ => PlanViewResponse::SCANS_MISSING,
             };
             let text = format!("{missing} within {:.0} s", deadline.as_secs_f64());
             return Err(Box::new(failed(code, text)));

@@ -92,3 +92,18 @@ fn clouds_meshes_and_poses_survive_the_way() {
     wrong.orientation.w += 1.0;
     assert!(pose_from_message(&wrong).unwrap_err().contains("length"));
 }
+
+#[test]
+fn a_region_keeps_what_its_message_leaves_open() {
+    use puffer_core::geometry::{Aabb, Vec3};
+    let of = |x, y, z| puffer_msgs::geometry_msgs::msg::Vector3 { x, y, z };
+    let configured = Aabb { min: Vec3::new(-1.0, -2.0, -0.1), max: Vec3::new(1.0, 2.0, 3.0) };
+    assert_eq!(region_from_message(&of(0.0, 0.0, 0.0), &configured), Ok(configured));
+    let asked = region_from_message(&of(0.2, 0.0, 0.5), &configured).unwrap();
+    assert_eq!(asked.min, Vec3::new(-0.1, -2.0, -0.1));
+    assert_eq!(asked.max, Vec3::new(0.1, 2.0, 0.5));
+    for wrong in [-0.1, f64::NAN, f64::INFINITY] {
+        let error = region_from_message(&of(0.1, wrong, 0.1), &configured).unwrap_err();
+        assert!(error.contains("roi"), "{error}");
+    }
+}

@@ -1,0 +1,65 @@
+//! The mesh as a marker, for those who watch.
+
+use puffer_core::mesh::Mesh;
+use puffer_core::mesh::io::{confidence_colour, confidence_scale};
+use puffer_msgs::geometry_msgs::msg::{Point, Vector3};
+use puffer_msgs::std_msgs::msg::{ColorRGBA, Header};
+use puffer_msgs::visualization_msgs::msg::Marker;
+use puffer_shell::convert::point_message;
+
+/// Colour of a mesh without sigma.
+const GREY: [u8; 3] = [215, 215, 220];
+
+/// The mesh as triangles with a colour at each corner: green to red by sigma, as in its files, and red where nothing was
+/// measured.
+pub(crate) fn mesh_marker(mesh: &Mesh, header: Header) -> Marker {
+    let scale = confidence_scale(&mesh.sigma);
+    let colour = |vertex: usize| {
+        let unobserved = mesh.observed.get(vertex) == Some(&false);
+        let [r, g, b] = match mesh.sigma.get(vertex) {
+            _ if unobserved => confidence_colour(f64::NAN, scale),
+            Some(sigma) => confidence_colour(*sigma, scale),
+            None => GREY,
+        };
+        let channel = |byte: u8| f32::from(byte) / 255.0;
+        ColorRGBA { r: channel(r), g: channel(g), b: channel(b), a: 1.0 }
+    };
+    let corners: Vec<usize> = mesh.triangles.as_flattened().iter().map(|v| *v as usize).collect();
+    let points: Vec<Point> = corners.iter().map(|v| point_message(&mesh.vertices[*v])).collect();
+    let mut marker = Marker {
+        header,
+        ns: "model".to_owned(),
+        r#type: Marker::TRIANGLE_LIST,
+        scale: Vector3 { x: 1.0, y: 1.0, z: 1.0 },
+        color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
+        points,
+        colors: corners.into_iter().map(colour).collect(),
+        ..Marker::default()
+    };
+    marker.pose.orientation.w = 1.0;
+    marker
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use puffer_core::geometry::Vec3;
+
+    #[test]
+    fn each_corner_has_the_colour_of_its_vertex() {
+        let mesh = Mesh {
+            vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            normals: Vec::new(),
+            sigma: vec![0.0, 1e-4, 1e-4, 1e-4],
+            observed: vec![true, true, true, false],
+        };
+        let marker = mesh_marker(&mesh, Header::default());
+        assert_eq!((marker.points.len(), marker.colors.len()), (6, 6));
+        assert_eq!((marker.points[5].z, marker.scale.x), (1.0, 1.0));
+        let [first, last] = [&marker.colors[0], &marker.colors[5]];
+        assert!(first.g > 0.8 && first.r < 0.2, "certain: green, {first:?}");
+        assert!(last.r > 0.8 && last.g < 0.2, "not observed: red, {last:?}");
+        assert!(marker.colors.iter().all(|c| c.a == 1.0));
+    }
+}

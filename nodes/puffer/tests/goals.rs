@@ -1,0 +1,49 @@
+//! What a goal of `model_object` may ask for.
+
+// The lints spare test functions only, not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use common::processes::{Running, free_domain};
+use puffer_core::mesh::io::read_mesh;
+use puffer_msgs::action::{ModelObject, ModelObjectGoal};
+use puffer_msgs::geometry_msgs::msg::Vector3;
+use puffer_shell::{NoParams, Node, Outcome, RosArgs, Stop};
+use std::path::Path;
+use std::time::Duration;
+
+/// Long enough for a loaded machine.
+const LONG: Duration = Duration::from_secs(300);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_region_bounds_the_mesh_and_a_sigma_out_of_reach_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let domain = free_domain();
+    let call = ["launch", "--setup", "kr16_laser", "--object", "coffee", "--out", "out"];
+    let launch = Running::start(folder.path(), domain, &call);
+    launch.wait_for("[modeller]: ready");
+    let args = RosArgs::default().with_domain(domain);
+    let node = Node::<NoParams>::start("operator", args, Stop::new()).await.unwrap();
+    let client = node.action_client::<ModelObject>("model_object").unwrap();
+    let goal = |z: f64, sigma: f32| ModelObjectGoal {
+        max_scans: 3,
+        sigma,
+        roi: Vector3 { x: 0.0, y: 0.0, z },
+        ..ModelObjectGoal::default()
+    };
+    for wrong in [goal(-0.1, 0.0), goal(0.0, f32::NAN)] {
+        assert!(client.send(&wrong, LONG).await.unwrap().is_none(), "{wrong:?} is no goal");
+    }
+    let handle = client.send(&goal(0.06, 1e-6), LONG).await.unwrap().unwrap();
+    let outcome = handle.result(LONG).await.unwrap();
+    let Outcome::Succeeded(result) = outcome else { panic!("{outcome:?}: {}", launch.said()) };
+    assert_eq!(result.scans, 3);
+    assert!(result.mean_sigma > 1e-6 && result.closed, "{result:?}");
+    for text in ["the number of scans allowed is reached", "0.001 mm was not reached"] {
+        assert!(result.reason.contains(text), "{}", result.reason);
+    }
+    let mesh = read_mesh(&folder.path().join(Path::new(&result.mesh_path))).unwrap();
+    let top = mesh.vertices.iter().map(|v| v.z).fold(f64::NEG_INFINITY, f64::max);
+    assert!((0.05..0.065).contains(&top), "the object goes on above the region: {top}");
+}
