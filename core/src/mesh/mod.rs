@@ -1,6 +1,7 @@
 //! Triangle meshes: the plain indexed mesh, and what is known of it.
 
 mod box_tree;
+mod cluster;
 mod half_edge;
 pub mod intersect;
 pub mod invariants;
@@ -12,6 +13,7 @@ pub mod render;
 pub(crate) mod test_shapes;
 mod triangle;
 
+pub use cluster::clustered;
 pub use half_edge::HalfEdgeMesh;
 pub use intersect::{self_intersections, self_intersections_among};
 pub use invariants::{

@@ -1,7 +1,7 @@
 //! The mesh as a marker, for those who watch.
 
-use puffer_core::mesh::Mesh;
 use puffer_core::mesh::io::{confidence_colour, confidence_scale};
+use puffer_core::mesh::{Mesh, clustered};
 use puffer_msgs::geometry_msgs::msg::{Point, Vector3};
 use puffer_msgs::std_msgs::msg::{ColorRGBA, Header};
 use puffer_msgs::visualization_msgs::msg::Marker;
@@ -10,10 +10,17 @@ use puffer_shell::convert::point_message;
 /// Colour of a mesh without sigma.
 const GREY: [u8; 3] = [215, 215, 220];
 
+/// Bytes of a triangle: three corners of three numbers and a colour each.
+const TRIANGLE: usize = 3 * (24 + 16);
+/// Bytes of everything else.
+const FRAME: usize = 1000;
+
 /// The mesh as triangles with a colour at each corner: green to red by sigma, as in its files, and red where nothing was
-/// measured.
-pub(crate) fn mesh_marker(mesh: &Mesh, header: Header) -> Marker {
+/// measured; with fewer triangles if it would take more than `most_bytes`.
+pub(crate) fn mesh_marker(mesh: &Mesh, header: Header, most_bytes: usize) -> Marker {
+    // The colours' scale is that of the whole mesh.
     let scale = confidence_scale(&mesh.sigma);
+    let mesh = &clustered(mesh, most_bytes.saturating_sub(FRAME) / TRIANGLE);
     let colour = |vertex: usize| {
         let unobserved = mesh.observed.get(vertex) == Some(&false);
         let [r, g, b] = match mesh.sigma.get(vertex) {
@@ -54,12 +61,31 @@ mod tests {
             sigma: vec![0.0, 1e-4, 1e-4, 1e-4],
             observed: vec![true, true, true, false],
         };
-        let marker = mesh_marker(&mesh, Header::default());
+        let marker = mesh_marker(&mesh, Header::default(), 100_000);
         assert_eq!((marker.points.len(), marker.colors.len()), (6, 6));
         assert_eq!((marker.points[5].z, marker.scale.x), (1.0, 1.0));
         let [first, last] = [&marker.colors[0], &marker.colors[5]];
         assert!(first.g > 0.8 && first.r < 0.2, "certain: green, {first:?}");
         assert!(last.r > 0.8 && last.g < 0.2, "not observed: red, {last:?}");
         assert!(marker.colors.iter().all(|c| c.a == 1.0));
+    }
+
+    #[test]
+    fn a_marker_fits_the_bytes_that_there_are() {
+        // A sheet of 5,000 triangles.
+        let at = |x: u32, y: u32| y * 51 + x;
+        let corner = |k: u32| Vec3::new(f64::from(k % 51), f64::from(k / 51), 0.0) * 1e-3;
+        let squares = (0..50).flat_map(|y| (0..50).map(move |x| (x, y)));
+        let triangles = squares.flat_map(|(x, y)| {
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        let mesh = Mesh::new((0..51 * 51).map(corner).collect(), triangles.collect());
+        for most_bytes in [1_000_000, 212_992] {
+            let marker = mesh_marker(&mesh, Header::default(), most_bytes);
+            let bytes = puffer_msgs::cdr::to_bytes(&marker).unwrap().len();
+            assert!((most_bytes / 3..=most_bytes).contains(&bytes), "{bytes} of {most_bytes}");
+            assert_eq!(marker.colors.len(), marker.points.len());
+        }
     }
 }

@@ -110,7 +110,12 @@ impl Counter {
         let (sec, nanosec) = self.node.now().parts();
         let frame_id = params.scan.object_frame;
         let header = Header { stamp: Time { sec, nanosec }, frame_id };
-        if let Err(error) = self.markers.publish(&mesh_marker(&mesh, header.clone())) {
+        let marker = mesh_marker(&mesh, header.clone(), self.markers.most_bytes());
+        let shown = marker.points.len() / 3;
+        if shown < mesh.triangles.len() {
+            tracing::debug!("model_marker shows {shown} triangles of {}", mesh.triangles.len());
+        }
+        if let Err(error) = self.markers.publish(&marker) {
             tracing::warn!("{error}");
         }
         let message = mesh_message(&mesh, header);

@@ -46,7 +46,7 @@ async fn a_late_joiner_gets_three_coloured_corners_a_triangle() {
     let client = caller.client::<Reconstruct>("mesh_reconstructor/reconstruct").unwrap();
     let input = folder.path().join("ball.ply");
     write_cloud(&input, &ball(), &[]).unwrap();
-    // So coarse that the message fits the socket buffers of a stock machine.
+    // So coarse that all of it fits the socket buffers of a stock machine.
     let input = input.display().to_string();
     let request = ReconstructRequest { input, edge_length: 0.015, ..ReconstructRequest::default() };
     let response = client.call(&request, SOON).await.unwrap();

@@ -1,14 +1,14 @@
 //! Topics of whole messages only, for those who watch.
 
 use super::error::BulkError;
-use super::whole::Whole;
+use super::whole::{Whole, largest_message};
 use puffer_msgs::Interface;
 use ros2_client::MessageTypeName;
 use rustdds::DomainParticipant;
 use std::marker::PhantomData;
 
 /// Publishes messages of type `M` whole and latched, for RViz and scripts: the newest one waits for the first reader,
-/// and stays for those that come later. What exceeds `net.core.rmem_max` is not sent, and the log says so.
+/// and stays for those that come later. What exceeds [`WholePublisher::most_bytes`] is not sent, and the log says so.
 pub struct WholePublisher<M> {
     topic: String,
     whole: Whole,
@@ -20,6 +20,11 @@ impl<M: Interface> WholePublisher<M> {
         let kind = MessageTypeName::new(M::PACKAGE, M::NAME);
         let whole = Whole::new(participant, topic, &kind, true)?;
         Ok(WholePublisher { topic: topic.to_owned(), whole, message: PhantomData })
+    }
+
+    /// Bytes that a message may have: what this machine's socket buffers carry (`net.core.rmem_max`).
+    pub fn most_bytes(&self) -> usize {
+        largest_message()
     }
 
     /// Publishes a message in place of the one before.

@@ -22,6 +22,11 @@ const KEPT: i32 = 4;
 /// `net.core.rmem_max` of stock Debian and Ubuntu, where the system does not tell.
 const STOCK_LIMIT: usize = 212_992;
 
+/// Bytes of a message at most. Measured: messages up to rmem_max arrive, those of twice its size only now and then.
+pub(crate) fn largest_message() -> usize {
+    receive_buffer_limit().unwrap_or(STOCK_LIMIT)
+}
+
 /// Passes on whole messages while outsiders read them. Of messages that come faster than they can be passed on, the
 /// newest counts: outsiders watch, they do not measure.
 pub(crate) struct Whole {
@@ -44,8 +49,7 @@ impl Whole {
             participant: participant.clone(),
             writer,
             latched,
-            // Measured: messages up to rmem_max arrive, those of twice its size only now and then.
-            largest: receive_buffer_limit().unwrap_or(STOCK_LIMIT),
+            largest: largest_message(),
             unsent: None,
             lost: 0,
             told: false,
