@@ -178,7 +178,7 @@ impl Counter {
             output_path: asked.output_path.clone(),
             edge_length: asked.edge_length,
         };
-        let wanted = Wanted { cloud_hash: asked.cloud_hash.clone(), roi: asked.roi.clone() };
+        let wanted = Wanted { cloud_hash: asked.cloud_hash.clone(), roi: asked.roi };
         let response = self.reconstruct(&request, &wanted, &progress).await;
         watch.abort();
         let (success, code) = (response.success, response.error_code);

@@ -88,7 +88,7 @@ impl Modeller {
         }
         self.inbox.clear();
         let journal = Journal::begin(&params, self.node.now())?;
-        let roi = goal.request().roi.clone();
+        let roi = goal.request().roi;
         let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, roi);
         let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
         let end = runner.run(session(&params, goal.request()), first, controls, told).await;

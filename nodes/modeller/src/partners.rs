@@ -180,7 +180,7 @@ impl Partners {
         let goal = ReconstructMeshGoal {
             output_path: self.node.params().modeller.mesh_path,
             cloud_hash: cloud_hash.to_owned(),
-            roi: roi.clone(),
+            roi: *roi,
             ..ReconstructMeshGoal::default()
         };
         let handle = send(&self.reconstruct, &goal).await?;

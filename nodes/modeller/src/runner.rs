@@ -154,7 +154,7 @@ impl<'a> Runner<'a> {
             scans: scans as u32,
             revision: self.revision,
             point_factor: factor as u32,
-            roi: self.roi.clone(),
+            roi: self.roi,
             ..PlanViewRequest::default()
         };
         let plan = self.partners.plan(&request).await?;

@@ -205,7 +205,7 @@ mod tests {
         let markers = candidates(&plan, &header(Stamp::default())).markers;
         let (clear, arrows) = markers.split_first().unwrap();
         assert_eq!(clear.action, Marker::DELETEALL);
-        let colours: Vec<_> = arrows.iter().map(|a| (a.id, a.color.clone())).collect();
+        let colours: Vec<_> = arrows.iter().map(|a| (a.id, a.color)).collect();
         assert_eq!(colours, [(0, REFUSED), (2, CONSIDERED), (1, CHOSEN)]);
         let chosen = &arrows[2];
         assert_eq!((chosen.r#type, chosen.points[0].x), (Marker::ARROW, 0.25));
