@@ -114,8 +114,7 @@ fn measure(
     let prepare = started.elapsed().as_secs_f64();
     let robot: Vec<Pose> = scans.views.iter().map(|v| v.reported_pose).collect();
     let started = Instant::now();
-    let found =
-        register(&prepared, &robot, Some(scans.pose_sigma), params, &Progress::silent())?;
+    let found = register(&prepared, &robot, Some(scans.pose_sigma), params, &Progress::silent())?;
     let register = started.elapsed().as_secs_f64();
     let errors = |poses: &[Pose]| pose_errors(&posed(scans, poses), truth, &Progress::silent());
     let refused = found.verdicts.iter().filter(|v| v.status != Status::Accepted).count();
