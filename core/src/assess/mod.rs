@@ -7,6 +7,7 @@
 mod align;
 mod calibration;
 mod distances;
+mod poses;
 mod reference;
 mod sample;
 mod stats;
@@ -17,6 +18,7 @@ mod topology;
 pub use align::{Alignment, align};
 pub use calibration::{Calibration, calibration};
 pub use distances::{Distances, RawDistances, Spread};
+pub use poses::{PoseErrors, PosedHits, pose_errors};
 pub use reference::{Nearest, Reference, distance_to_open_truth};
 pub use sample::{Sample, sample_surface};
 pub use topology::{Topology, topology};

@@ -1,110 +1,30 @@
-//! Joint optimisation of all accepted scans: point-to-plane residuals between every two that overlap, and the
-//! robot's pose of each as prior (multi-view registration; Pulli 1999 for the problem, Barfoot 2017 for the
-//! perturbations). Without a fixed scan, so that the error is spread and the priors alone place the whole.
+//! Joint optimisation of all accepted scans: each is held to the surface that all share, and to the robot's pose
+//! (multi-view registration; Pulli 1999 for the problem, Barfoot 2017 for the perturbations). No scan is fixed, so
+//! that the error is spread and the priors alone place the whole.
+//!
+//! The height of each patch of the surface is an unknown of its own. Eliminated, it leaves for the patch's
+//! measurements r_i with weights w_i
+//!
+//! ```text
+//! sum_i w_i (r_i - m)^2,    m = sum_i w_i r_i / sum_i w_i.                              (1)
+//! ```
 
-use super::align::{Map, halfway};
-use super::factors::{scan_to_scan, tukey};
+use super::correlation::effective_share;
+use super::sample::Sample;
+use super::surfels::{Surfels, Term};
 use super::verdict::Status;
-use super::{PreparedScan, RegisterParams, Registration};
-use crate::geometry::{Aabb, KdTree, Pose, Vec3, exp, log, median};
+use super::{RegisterParams, Registration};
+use crate::geometry::{Mat6, Pose, Twist, exp, log, median};
 use crate::{Error, Progress, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// One scan made ready for registration, sensor frame.
-pub(crate) struct Sample {
-    /// The points that are aligned.
-    pub points: Vec<Vec3>,
-    pub normals: Vec<Vec3>,
-    /// Denser points, for others to be aligned to.
-    targets: Vec<Vec3>,
-    target_normals: Vec<Vec3>,
-    /// Distance between the targets, metres.
-    pub target_spacing: f64,
-    pub noise: f64,
-    /// Median distance of the points from the sensor, metres.
-    pub distance: f64,
-    /// Diagonal of the points' box, metres.
-    pub extent: f64,
-    tree: KdTree,
-    bounds: Aabb,
-}
-
-/// A point of one scan and the plane of another that it should lie on.
-#[derive(Clone, Copy)]
-pub(crate) struct Match {
-    /// Index of the point.
-    pub point: usize,
-    /// A point of the plane, and its normal, in the other scan's frame.
-    pub target: Vec3,
-    pub plane: Vec3,
-    /// Signed distance to the plane, metres.
-    pub distance: f64,
-}
-
-impl Sample {
-    pub(crate) fn new(scan: &PreparedScan, count: usize) -> Sample {
-        let kept = scan.sample(count);
-        let points: Vec<Vec3> = kept.iter().map(|&i| scan.points[i]).collect();
-        let dense = scan.sample(TARGETS);
-        let targets: Vec<Vec3> = dense.iter().map(|&i| scan.points[i]).collect();
-        let bounds = Aabb::of(&targets);
-        Sample {
-            normals: kept.iter().map(|&i| scan.normals[i]).collect(),
-            noise: scan.noise.max(1e-6),
-            target_spacing: scan.spacing
-                * (scan.points.len() as f64 / targets.len().max(1) as f64).sqrt(),
-            distance: median(points.iter().map(Vec3::norm).collect()).unwrap_or(0.0),
-            extent: bounds.diagonal(),
-            tree: KdTree::new(&targets),
-            target_normals: dense.iter().map(|&i| scan.normals[i]).collect(),
-            targets,
-            bounds,
-            points,
-        }
-    }
-
-    /// Adds the targets, seen from `pose`, to the map.
-    pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
-        map.insert(&self.targets, &self.target_normals, pose);
-    }
-
-    /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
-    pub(crate) fn reach(&self, noise: f64) -> f64 {
-        (3.0 * self.target_spacing).max(4.0 * noise)
-    }
-
-    /// For each point that has one, its closest point in `other` within `reach`, normals within `cosine`.
-    pub(crate) fn matches<'a>(
-        &'a self,
-        other: &'a Sample,
-        other_from_self: &'a Pose,
-        reach: f64,
-        cosine: f64,
-    ) -> impl Iterator<Item = Match> + 'a {
-        let bounds = other.bounds.padded(reach);
-        self.points.iter().zip(&self.normals).enumerate().filter_map(move |(point, (p, normal))| {
-            let seen = other_from_self.rotation * p + other_from_self.translation.vector;
-            if !bounds.contains(&seen) {
-                return None;
-            }
-            let (target, _) = other.tree.nearest_within(&seen, reach)?;
-            let (there, here) = (&other.target_normals[target], other_from_self.rotation * normal);
-            let agreement = there.dot(&here);
-            let plane = halfway(there, &here, agreement);
-            let target = other.targets[target];
-            let distance = plane.dot(&(seen - target));
-            (agreement >= cosine).then_some(Match { point, target, plane, distance })
-        })
-    }
-}
-
-/// Targets kept of a scan: at a tenth of a million, searches take longer and find nothing better.
-const TARGETS: usize = 40_000;
-/// The radius shrinks to its end by this factor a pass.
+/// The search radius shrinks to its end by this factor a pass.
 const SHRINK: f64 = 0.6;
-/// Gauss-Newton steps with the same correspondences.
-const STEPS: usize = 2;
+/// A step below this many standard deviations of a pose does not matter any more.
+const SMALL_STEP: f64 = 0.05;
+/// Surfels along the diagonal of the largest scan at most: finer ones cost time and tell nothing new.
+const FINEST: f64 = 64.0;
 
 /// Moves the poses of all accepted scans to their joint optimum.
 pub(crate) fn optimise(
@@ -114,53 +34,45 @@ pub(crate) fn optimise(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<()> {
-    let members: Vec<usize> = (0..samples.len())
-        .filter(|&i| registration.verdicts[i].status == Status::Accepted)
-        .collect();
+    let members = accepted(samples, registration);
     if members.len() < 2 {
         return Ok(());
     }
     let mut poses: Vec<Pose> = members.iter().map(|&i| registration.poses[i]).collect();
-    let information = registration.pose_sigma.information();
-    let noise =
-        members.iter().map(|&i| samples[i].noise).fold(0.0, f64::max) * std::f64::consts::SQRT_2;
-    let end = members.iter().map(|&i| samples[i].reach(noise)).fold(0.0, f64::max);
-    let mut reach = (4.0 * end)
-        .min(end.max(3.0 * registration.pose_sigma.of_point(samples[members[0]].distance)));
+    let prior = registration.pose_sigma.information();
+    let scans: Vec<&Sample> = members.iter().map(|&i| &samples[i]).collect();
+    let end = Scale::finest(&scans);
+    let mut now = end.coarser(4.0);
     let mut hessian = DMatrix::zeros(0, 0);
     for pass in 0..params.joint_iterations {
         progress.report("optimise", pass as f64 / params.joint_iterations as f64)?;
-        let cosine = params.max_normal_angle.cos();
-        let pairs = pairs(samples, &members, &poses, reach, cosine);
-        let scale = robust_scale(&pairs, noise / 2.0);
-        let mut moved = 0.0_f64;
-        for _ in 0..STEPS {
-            let mut gradient;
-            (hessian, gradient) =
-                system(samples, &members, &poses, &pairs, scale, params.information_share);
-            for (k, pose) in poses.iter().enumerate() {
-                let correction = information * log(&(robot[members[k]].inverse() * pose));
-                let mut block = hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k);
-                block += information;
-                let mut rows = gradient.fixed_rows_mut::<6>(6 * k);
-                rows += correction;
-            }
-            let Some(solver) = hessian.clone().cholesky() else {
-                return Err(Error::input(
-                    "the joint registration is singular: is a pose sigma infinite?",
-                ));
-            };
-            let step = solver.solve(&-gradient);
-            for (k, pose) in poses.iter_mut().enumerate() {
-                *pose *= exp(&step.fixed_rows::<6>(6 * k).into_owned());
-            }
-            moved = moved.max(step.amax());
+        let at_end = now.reach <= end.reach;
+        let found = Measured::new(&scans, &poses, now, at_end, params);
+        let (geometry, mut gradient) = found.system();
+        hessian = geometry;
+        for (k, pose) in poses.iter().enumerate() {
+            let mut block = hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k);
+            block += prior;
+            let mut rows = gradient.fixed_rows_mut::<6>(6 * k);
+            rows += prior * log(&(robot[members[k]].inverse() * pose));
         }
-        let at_end = reach <= end;
-        reach = (reach * SHRINK).max(end);
-        if at_end && moved < 2e-6 {
+        let Some(solver) = hessian.clone().cholesky() else {
+            return Err(Error::input(
+                "the joint registration is singular: is a pose sigma infinite?",
+            ));
+        };
+        let step = solver.solve(&-gradient);
+        let mut moved = 0.0_f64;
+        for (k, pose) in poses.iter_mut().enumerate() {
+            let xi: Twist = step.fixed_rows::<6>(6 * k).into_owned();
+            let block: Mat6 = hessian.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
+            moved = moved.max(xi.dot(&(block * xi)).sqrt());
+            *pose *= exp(&xi);
+        }
+        if at_end && moved < SMALL_STEP {
             break;
         }
+        now = now.finer(&end);
     }
     let covariance = hessian.cholesky().map(|c| c.inverse());
     for (k, &i) in members.iter().enumerate() {
@@ -173,95 +85,206 @@ pub(crate) fn optimise(
     Ok(())
 }
 
-/// Correspondences from scan `from` to scan `to` (positions in the list of members).
-struct Pair {
-    from: usize,
-    to: usize,
-    matches: Vec<Match>,
+fn accepted(samples: &[Sample], registration: &Registration) -> Vec<usize> {
+    (0..samples.len()).filter(|&i| registration.verdicts[i].status == Status::Accepted).collect()
 }
 
-fn pairs(
-    samples: &[Sample],
-    members: &[usize],
-    poses: &[Pose],
+/// How finely the surface is looked at.
+#[derive(Clone, Copy)]
+struct Scale {
+    /// Distance between surfels, metres.
+    edge: f64,
+    /// How far off a measurement may lie, metres.
     reach: f64,
-    cosine: f64,
-) -> Vec<Pair> {
-    let indices: Vec<(usize, usize)> = (0..members.len())
-        .flat_map(|from| (0..members.len()).filter(move |&to| to != from).map(move |to| (from, to)))
-        .collect();
-    indices
-        .into_par_iter()
-        .map(|(from, to)| {
-            let to_from = poses[to].inverse() * poses[from];
-            let (a, b) = (&samples[members[from]], &samples[members[to]]);
-            Pair { from, to, matches: a.matches(b, &to_from, reach, cosine).collect() }
-        })
-        .filter(|pair| pair.matches.len() >= 20)
-        .collect()
 }
 
-/// Standard deviation of the residuals by their median absolute deviation, not below `least`.
-fn robust_scale(pairs: &[Pair], least: f64) -> f64 {
-    let residuals = pairs.iter().flat_map(|p| p.matches.iter().map(|m| m.distance.abs())).collect();
-    median(residuals).map_or(least, |m| (1.4826 * m).max(least))
-}
+impl Scale {
+    fn finest(scans: &[&Sample]) -> Scale {
+        let typical =
+            |f: fn(&Sample) -> f64| median(scans.iter().map(|s| f(s)).collect()).unwrap_or(1e-3);
+        let extent = scans.iter().map(|s| s.extent).fold(0.0, f64::max);
+        let edge = (2.5 * typical(|s| s.target_spacing)).max(3.0 * typical(|s| s.noise));
+        let edge = edge.max(extent / FINEST);
+        Scale { edge, reach: edge.max(6.0 * typical(|s| s.noise)) }
+    }
 
-fn system(
-    samples: &[Sample],
-    members: &[usize],
-    poses: &[Pose],
-    pairs: &[Pair],
-    scale: f64,
-    share: f64,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let blocks: Vec<_> = pairs
-        .par_iter()
-        .map(|pair| {
-            let a = &samples[members[pair.from]];
-            let mut sums = nalgebra::SMatrix::<f64, 12, 13>::zeros();
-            for m in &pair.matches {
-                let (r, by_from, by_to) = scan_to_scan(
-                    &poses[pair.from],
-                    &poses[pair.to],
-                    &a.points[m.point],
-                    &m.target,
-                    &m.plane,
-                );
-                let weight = tukey(r / scale) * share / (scale * scale);
-                let mut row = nalgebra::SVector::<f64, 13>::zeros();
-                row.fixed_rows_mut::<6>(0).copy_from(&by_from);
-                row.fixed_rows_mut::<6>(6).copy_from(&by_to);
-                row[12] = r;
-                sums += row.fixed_rows::<12>(0) * row.transpose() * weight;
-            }
-            sums
-        })
-        .collect();
-    let size = 6 * members.len();
-    let (mut hessian, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
-    for (pair, sums) in pairs.iter().zip(&blocks) {
-        let places = [6 * pair.from, 6 * pair.to];
-        for (r, &row) in places.iter().enumerate() {
-            let mut rows = gradient.fixed_rows_mut::<6>(row);
-            rows += sums.fixed_view::<6, 1>(6 * r, 12);
-            for (c, &column) in places.iter().enumerate() {
-                let mut block = hessian.fixed_view_mut::<6, 6>(row, column);
-                block += sums.fixed_view::<6, 6>(6 * r, 6 * c);
-            }
+    fn coarser(self, factor: f64) -> Scale {
+        Scale { edge: self.edge * factor, reach: self.reach * factor }
+    }
+
+    fn finer(self, end: &Scale) -> Scale {
+        Scale {
+            edge: (self.edge * SHRINK).max(end.edge),
+            reach: (self.reach * SHRINK).max(end.reach),
         }
     }
-    (hessian, gradient)
+}
+
+/// All scans' measurements of the common surface.
+struct Measured {
+    surfels: usize,
+    /// One list a scan.
+    terms: Vec<Vec<Term>>,
+    /// Measurements of places that other scans saw too.
+    redundant: usize,
+    /// Robust standard deviation of a point about the surface, metres.
+    scale: f64,
+    /// Variance of a measurement of `n` points: `between + within / n`, square metres.
+    between: f64,
+    within: f64,
+    /// What a measurement counts for, given its neighbours' share in the same noise.
+    share: f64,
+}
+
+impl Measured {
+    fn new(
+        scans: &[&Sample],
+        poses: &[Pose],
+        at: Scale,
+        at_end: bool,
+        params: &RegisterParams,
+    ) -> Measured {
+        let cosine = params.max_normal_angle.cos();
+        let views: Vec<(&Sample, Pose)> =
+            scans.iter().copied().zip(poses.iter().copied()).collect();
+        let surfels = Surfels::new(&views, at.edge, cosine);
+        let floor = median(scans.iter().map(|s| s.noise).collect()).unwrap_or(1e-6) / 2.0;
+        let look = |scale: f64| -> Vec<Vec<Term>> {
+            views
+                .par_iter()
+                .map(|(sample, pose)| surfels.terms(sample, pose, at.reach, scale, cosine))
+                .collect()
+        };
+        let count = surfels.centers.len();
+        // First everything in reach, to learn how large the residuals are.
+        let mut terms = look(at.reach);
+        let scale = spread(&terms, count).max(floor);
+        terms = look(scale);
+        let (between, within) = variances(&terms, count, floor);
+        let heights = heights(&terms, count);
+        let redundant = deviations(&terms, &heights).count();
+        for term in terms.iter_mut().flatten() {
+            term.residual -= heights[term.surfel as usize].0;
+        }
+        let share =
+            if at_end { effective_share(&surfels, &terms) } else { params.information_share };
+        Measured { surfels: count, terms, redundant, scale, between, within, share }
+    }
+
+    fn information(&self, term: &Term) -> f64 {
+        self.share / (self.between + self.within / term.weight)
+    }
+
+    /// Hessian and gradient of (1), halved.
+    fn system(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let size = 6 * self.terms.len();
+        let (mut hessian, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let mut of_surfel: Vec<Vec<(usize, Twist, f64, f64)>> = vec![Vec::new(); self.surfels];
+        for (k, terms) in self.terms.iter().enumerate() {
+            for term in terms {
+                of_surfel[term.surfel as usize].push((
+                    k,
+                    term.jacobian,
+                    self.information(term),
+                    term.residual,
+                ));
+            }
+            let mut block = Mat6::zeros();
+            let mut rows = Twist::zeros();
+            for term in terms.iter() {
+                let information = self.information(term);
+                block += term.jacobian * term.jacobian.transpose() * information;
+                rows += term.jacobian * (term.residual * information);
+            }
+            hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(&block);
+            gradient.fixed_rows_mut::<6>(6 * k).copy_from(&rows);
+        }
+        for seen in &of_surfel {
+            let total: f64 = seen.iter().map(|s| s.2).sum();
+            let mean = seen.iter().map(|s| s.2 * s.3).sum::<f64>() / total;
+            for (a, ja, wa, _) in seen {
+                let mut rows = gradient.fixed_rows_mut::<6>(6 * a);
+                rows -= ja * (wa * mean);
+                for (b, jb, wb, _) in seen {
+                    let mut block = hessian.fixed_view_mut::<6, 6>(6 * a, 6 * b);
+                    block -= ja * jb.transpose() * (wa * wb / total);
+                }
+            }
+        }
+        (hessian, gradient)
+    }
+}
+
+/// The mean height of each surfel over the scans that saw it, with the number of scans.
+fn heights(terms: &[Vec<Term>], surfels: usize) -> Vec<(f64, f64)> {
+    let mut sums = vec![(0.0, 0.0); surfels];
+    for term in terms.iter().flatten() {
+        let sum = &mut sums[term.surfel as usize];
+        sum.0 += term.residual;
+        sum.1 += 1.0;
+    }
+    sums.into_iter().map(|(sum, count)| (sum / f64::max(count, 1.0), count)).collect()
+}
+
+/// Deviations of the scans' measurements from the mean of all, scaled to the deviation of one scan alone (n of them
+/// about their own mean scatter too little, by (n - 1) / n); surfels that one scan alone saw have none.
+fn deviations<'a>(
+    terms: &'a [Vec<Term>],
+    heights: &'a [(f64, f64)],
+) -> impl Iterator<Item = (f64, &'a Term)> {
+    terms.iter().flatten().filter_map(|term| {
+        let (height, scans) = heights[term.surfel as usize];
+        (scans > 1.0).then(|| ((term.residual - height) * (scans / (scans - 1.0)).sqrt(), term))
+    })
+}
+
+/// Robust standard deviation of a single point about the surface, metres; 0 without redundant measurements.
+fn spread(terms: &[Vec<Term>], surfels: usize) -> f64 {
+    let heights = heights(terms, surfels);
+    let off = median(deviations(terms, &heights).map(|(d, _)| d.abs()).collect()).unwrap_or(0.0);
+    let within = terms.iter().flatten().filter(|t| t.weight > 2.0).map(|t| t.variance);
+    // The median absolute deviation of a normal distribution is 0.6745 standard deviations.
+    (off / 0.6745).hypot(median(within.collect()).unwrap_or(0.0).sqrt())
+}
+
+/// Variances between and within the scans' measurements, square metres.
+fn variances(terms: &[Vec<Term>], surfels: usize, floor: f64) -> (f64, f64) {
+    let (mut square, mut points) = (0.0, 0.0);
+    for term in terms.iter().flatten().filter(|t| t.weight > 2.0) {
+        square += term.variance * term.weight;
+        points += term.weight - 1.0;
+    }
+    let within = square / f64::max(points, 1.0);
+    let heights = heights(terms, surfels);
+    let (mut square, mut white, mut count) = (0.0, 0.0, 0.0);
+    for (deviation, term) in deviations(terms, &heights) {
+        square += deviation * deviation;
+        white += within / term.weight;
+        count += 1.0;
+    }
+    let total = square / f64::max(count, 1.0);
+    let between =
+        (total - white / f64::max(count, 1.0)).max(0.05 * total).max(1e-4 * floor * floor);
+    (between, within)
 }
 
 /// Root mean square point-to-plane distance between the accepted scans, metres, robustly (from the median
 /// absolute distance); NaN if no two overlap.
-pub(crate) fn residual(samples: &[Sample], registration: &Registration) -> f64 {
-    let members: Vec<usize> = (0..samples.len())
-        .filter(|&i| registration.verdicts[i].status == Status::Accepted)
-        .collect();
+pub(crate) fn residual(
+    samples: &[Sample],
+    registration: &Registration,
+    params: &RegisterParams,
+) -> f64 {
+    let members = accepted(samples, registration);
+    let scans: Vec<&Sample> = members.iter().map(|&i| &samples[i]).collect();
     let poses: Vec<Pose> = members.iter().map(|&i| registration.poses[i]).collect();
-    let reach = samples.iter().map(|s| s.reach(1.5 * s.noise)).fold(0.0, f64::max);
-    let pairs = pairs(samples, &members, &poses, reach, 0.7);
-    if pairs.is_empty() { f64::NAN } else { robust_scale(&pairs, 0.0) }
+    if members.len() < 2 {
+        return f64::NAN;
+    }
+    let found = Measured::new(&scans, &poses, Scale::finest(&scans), false, params);
+    if found.redundant == 0 {
+        return f64::NAN;
+    }
+    // Two scans' errors lie between two points.
+    found.scale * std::f64::consts::SQRT_2
 }

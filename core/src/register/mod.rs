@@ -7,12 +7,15 @@
 //! the robot says, and a joint optimisation over all accepted scans spreads the remaining error.
 
 mod align;
+mod correlation;
 mod factors;
 mod joint;
 mod prepare;
 mod registrar;
+mod sample;
 mod sigma;
 mod stages;
+mod surfels;
 mod verdict;
 
 pub use prepare::PreparedScan;
@@ -22,6 +25,7 @@ pub use verdict::{Status, Verdict};
 use crate::geometry::Pose;
 use crate::scans::PoseSigma;
 use crate::{Error, Progress, Result};
+use sample::Sample;
 
 crate::choice! {
     /// How scans are aligned.
@@ -52,8 +56,9 @@ crate::params! {
         max_iterations: usize = 60, in [1, 1000];
         /// Times that a scan put aside is tried at most.
         max_rounds: usize = 5, in [1, 100];
-        /// What a correspondence counts for beside the prior; below 1 because neighbours share their noise.
-        information_share: f64 = 0.1, in [0.0001, 1.0];
+        /// What a correspondence counts for beside the prior while the scans are being brought together; below 1 because
+        /// neighbours share their noise. At the end it is estimated from the residuals.
+        information_share: f64 = 0.05, in [0.0001, 1.0];
         /// Corrections beyond this many standard deviations of the prior are deferred, then refused.
         max_correction: f64 = 3.0, in [0.5, 100.0];
         /// Whether all accepted scans are optimised together at the end.
@@ -87,11 +92,10 @@ impl Registration {
         let verdicts = vec![Verdict { free_directions: Vec::new(), ..verdict }; poses.len()];
         let mut registration =
             Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN };
-        let samples: Vec<joint::Sample> = scans
-            .iter()
-            .map(|s| joint::Sample::new(s, RegisterParams::default().samples))
-            .collect();
-        registration.residual = joint::residual(&samples, &registration);
+        let samples: Vec<Sample> =
+            scans.iter().map(|s| Sample::new(s, RegisterParams::default().samples)).collect();
+        registration.residual =
+            joint::residual(&samples, &registration, &RegisterParams::default());
         registration
     }
 }
@@ -109,13 +113,12 @@ pub fn register(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let samples: Vec<joint::Sample> =
-        scans.iter().map(|s| joint::Sample::new(s, params.samples)).collect();
+    let samples: Vec<Sample> = scans.iter().map(|s| Sample::new(s, params.samples)).collect();
     register_samples(&samples, robot, pose_sigma, params, progress)
 }
 
 fn register_samples(
-    samples: &[joint::Sample],
+    samples: &[Sample],
     robot: &[Pose],
     pose_sigma: Option<PoseSigma>,
     params: &RegisterParams,
@@ -138,7 +141,7 @@ fn register_samples(
             joint::optimise(samples, robot, &mut registration, params, progress)?;
         }
     }
-    registration.residual = joint::residual(samples, &registration);
+    registration.residual = joint::residual(samples, &registration, params);
     Ok(registration)
 }
 

@@ -1,6 +1,6 @@
 //! Registration of scans as they come.
 
-use super::joint::Sample;
+use super::sample::Sample;
 use super::stages::{place, waiting};
 use super::verdict::{Status, Verdict};
 use super::{PoseSigma, PreparedScan, RegisterParams, Registration, align::Map, register_samples};

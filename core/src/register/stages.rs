@@ -1,7 +1,7 @@
 //! The two stages (Wiedemann 2014, §2.3.1): align each scan to the map, then try those put aside again.
 
 use super::align::{Map, Moving, Prior, Radius, align, correspondences};
-use super::joint::Sample;
+use super::sample::Sample;
 use super::verdict::{Status, Verdict};
 use super::{Method, PoseSigma, RegisterParams, Registration};
 use crate::geometry::Pose;

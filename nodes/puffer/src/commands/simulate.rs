@@ -46,16 +46,11 @@ impl Simulate {
     pub(super) fn run(&self) -> Result<()> {
         let mut params = SimulateParams { family: self.family()?, ..SimulateParams::default() };
         params.set("views", &Value::from(self.views))?;
-        let truth = self.truth()?;
+        let truth = truth_of(&self.object)?;
         let watch = Watch::start();
         let scans = simulate(&truth, &params, self.seed, watch.progress())?;
         let times = watch.finish();
-        let truth_dir = self.truth_dir()?;
-        for folder in [&self.output, &truth_dir] {
-            std::fs::create_dir_all(folder)
-                .with_context(|| format!("cannot create {}", folder.display()))?;
-        }
-        write(&self.output, &truth_dir, &truth, &scans)?;
+        let truth_dir = write_folder(&self.output, &truth, &scans)?;
         let mut report = Report::default();
         let points: usize = scans.views.iter().map(|v| v.scan.returns().count()).sum();
         report.add("views", scans.views.len().to_string(), "views", scans.views.len());
@@ -87,26 +82,44 @@ impl Simulate {
             usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
         })
     }
+}
 
-    fn truth(&self) -> Result<Mesh> {
-        let path = Path::new(&self.object);
-        if path.extension().is_none() && !path.exists() {
-            return Ok(objects::make(&self.object)?);
-        }
-        let mesh = read_mesh(path)?;
-        objects::check_ground_truth(&mesh).with_context(|| self.object.clone())?;
-        Ok(mesh)
+/// The object of this name, or the closed mesh (metres) in this file.
+///
+/// # Errors
+/// No such object or file, or a mesh that is not closed.
+pub(crate) fn truth_of(object: &str) -> Result<Mesh> {
+    let path = Path::new(object);
+    if path.extension().is_none() && !path.exists() {
+        return Ok(objects::make(object)?);
     }
+    let mesh = read_mesh(path)?;
+    objects::check_ground_truth(&mesh).with_context(|| object.to_owned())?;
+    Ok(mesh)
+}
 
-    /// `DIR.truth`, beside `DIR`.
-    fn truth_dir(&self) -> Result<PathBuf> {
-        let name = self.output.file_name().ok_or_else(|| {
-            usage(format!("-o {}: give a folder with a name of its own", self.output.display()))
-        })?;
-        let mut name = name.to_os_string();
-        name.push(".truth");
-        Ok(self.output.with_file_name(name))
+/// Writes the scan folder `dir` and, beside it, `dir.truth`, whose path is returned.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub(crate) fn write_folder(dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<PathBuf> {
+    let truth_dir = truth_dir(dir)?;
+    for folder in [dir, &truth_dir] {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot create {}", folder.display()))?;
     }
+    write(dir, &truth_dir, truth, scans)?;
+    Ok(truth_dir)
+}
+
+/// `DIR.truth`, beside `DIR`.
+fn truth_dir(dir: &Path) -> Result<PathBuf> {
+    let name = dir.file_name().ok_or_else(|| {
+        usage(format!("-o {}: give a folder with a name of its own", dir.display()))
+    })?;
+    let mut name = name.to_os_string();
+    name.push(".truth");
+    Ok(dir.with_file_name(name))
 }
 
 fn write(dir: &Path, truth_dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<()> {

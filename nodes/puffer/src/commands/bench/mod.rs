@@ -4,6 +4,7 @@ mod child;
 mod memory;
 mod payload;
 mod process;
+mod registration;
 mod transport;
 
 use anyhow::Result;
@@ -18,6 +19,8 @@ pub struct Bench {
 
 #[derive(Subcommand)]
 enum Part {
+    /// Register simulated scans, and measure the poses against the truth
+    Registration(registration::Registration),
     /// Send large samples from one process to others, and check every byte
     Transport(transport::Transport),
     /// One process of the transport benchmark
@@ -28,6 +31,7 @@ enum Part {
 impl Bench {
     pub(super) fn run(&self) -> Result<()> {
         match &self.part {
+            Part::Registration(command) => command.run(),
             Part::Transport(command) => command.run(),
             Part::TransportChild(command) => command.run(),
         }

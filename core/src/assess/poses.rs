@@ -1,0 +1,132 @@
+//! How good registered poses are: one definition of each figure for all.
+//!
+//! Noise-free hits say it without the sensor's own noise: where does the estimated pose put a point of the surface,
+//! and where the true one?
+
+use super::MM;
+use super::align::{align, apply};
+use super::reference::Reference;
+use super::stats::{quantile, rms};
+use crate::geometry::{Pose, Vec3, rigid_fit};
+use crate::mesh::Mesh;
+use crate::{Error, Progress, Result};
+use rayon::prelude::*;
+
+/// One view: where its rays met the object, and the two poses.
+#[derive(Clone, Debug)]
+pub struct PosedHits {
+    /// Noise-free hits, true sensor frame, metres.
+    pub hits: Vec<Vec3>,
+    /// `object_from_sensor` as it was.
+    pub truth: Pose,
+    /// `object_from_sensor` as estimated.
+    pub estimate: Pose,
+}
+
+/// Errors of a set of poses, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseErrors {
+    /// Root mean square distance between where the estimated and the true poses put the hits, after one common rigid
+    /// fit.
+    pub full: f64,
+    /// The part of it along the true normals.
+    pub normal: f64,
+    /// Distance of the hits, moved by the estimated poses, to the true surface after one robust rigid fit to it: root
+    /// mean square of the nearest 95 %.
+    pub surface: f64,
+}
+
+/// The share of the surface distances that counts: the rest are views put somewhere else.
+const NEAREST: f64 = 0.95;
+/// Rounds of the robust fit to the surface, each without the farthest points of the one before.
+const TRIMS: usize = 2;
+
+/// Measures the estimated poses of `views` of the closed surface `truth` (metres, object frame).
+///
+/// # Errors
+/// [`Error::Input`] if there are fewer than three hits or the truth has no triangle; [`Error::Cancelled`].
+pub fn pose_errors(views: &[PosedHits], truth: &Mesh, progress: &Progress) -> Result<PoseErrors> {
+    let reference = Reference::new(truth)?;
+    let placed = |pose: fn(&PosedHits) -> &Pose| -> Vec<Vec3> {
+        views.iter().flat_map(|v| v.hits.iter().map(move |h| apply(pose(v), h))).collect()
+    };
+    let there = placed(|v| &v.truth);
+    let here = placed(|v| &v.estimate);
+    let fit = rigid_fit(&here, &there).ok_or_else(|| {
+        Error::input(format!("{} hits: at least three are needed to compare poses", here.len()))
+    })?;
+    let errors: Vec<(f64, f64)> = here
+        .par_iter()
+        .zip(&there)
+        .map(|(a, b)| {
+            let error = apply(&fit, a) - b;
+            (error.norm(), error.dot(&reference.nearest(b).normal))
+        })
+        .collect();
+    let (full, normal): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
+    let surface = surface_error(&here, &fit, &reference, progress)?;
+    Ok(PoseErrors { full: rms(&full) * MM, normal: rms(&normal) * MM, surface: surface * MM })
+}
+
+/// Root mean square distance of the nearest points to the surface after a fit to it that starts at `start`.
+fn surface_error(
+    points: &[Vec3],
+    start: &Pose,
+    reference: &Reference,
+    progress: &Progress,
+) -> Result<f64> {
+    let mut moved: Vec<Vec3> = points.iter().map(|p| apply(start, p)).collect();
+    let mut near = moved.clone();
+    for _ in 0..TRIMS {
+        let pose = align(&near, reference, progress)?.pose;
+        moved.iter_mut().for_each(|p| *p = apply(&pose, p));
+        near = nearest_share(&moved, reference).into_iter().map(|i| moved[i]).collect();
+    }
+    let distances: Vec<f64> = near.par_iter().map(|p| reference.nearest(p).distance).collect();
+    Ok(rms(&distances))
+}
+
+/// The points that are among the nearest 95 %.
+fn nearest_share(points: &[Vec3], reference: &Reference) -> Vec<usize> {
+    let distances: Vec<f64> = points.par_iter().map(|p| reference.nearest(p).distance).collect();
+    let limit = quantile(&distances, NEAREST);
+    (0..points.len()).filter(|&i| distances[i] <= limit).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Twist, exp};
+    use crate::mesh::test_shapes::cuboid;
+
+    fn views(error: impl Fn(usize) -> Twist) -> (Vec<PosedHits>, Mesh) {
+        let truth = cuboid(Vec3::zeros(), Vec3::new(0.1, 0.07, 0.05));
+        let samples = crate::assess::sample_surface(&truth, 6000, 1, 0).unwrap();
+        let views = samples.chunks(1000).enumerate().map(|(i, samples)| {
+            let pose = exp(&Twist::new(0.1 * i as f64, 0.3, -0.2, 0.3 * i as f64, 0.1, 0.5));
+            let hits = samples.iter().map(|s| apply(&pose.inverse(), &s.point)).collect();
+            PosedHits { hits, truth: pose, estimate: exp(&error(i)) * pose }
+        });
+        (views.collect(), truth)
+    }
+
+    #[test]
+    fn a_common_motion_is_no_error() {
+        let (views, truth) = views(|_| Twist::new(0.002, -0.003, 0.001, 0.02, 0.01, -0.03));
+        let errors = pose_errors(&views, &truth, &Progress::silent()).unwrap();
+        assert!(errors.full < 1e-9 && errors.normal < 1e-9, "{errors:?}");
+        assert!(errors.surface < 1e-4, "{errors:?}");
+    }
+
+    #[test]
+    fn opposite_shifts_show_in_full_and_partly_along_the_normal() {
+        let shift = |i: usize| if i.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        let (views, truth) = views(|i| Twist::new(shift(i), 0.0, 0.0, 0.0, 0.0, 0.0));
+        let errors = pose_errors(&views, &truth, &Progress::silent()).unwrap();
+        assert!((errors.full - 1.0).abs() < 0.05, "{errors:?}");
+        // The sides across x have 22 % of the area.
+        let expected = (0.07f64 * 0.05 / (0.07 * 0.05 + 0.1 * 0.05 + 0.1 * 0.07)).sqrt();
+        assert!((errors.normal - expected).abs() < 0.1, "{errors:?}");
+        assert!(errors.surface < errors.normal, "{errors:?}");
+    }
+}

@@ -1,0 +1,58 @@
+//! One scan made ready for registration.
+
+use super::PreparedScan;
+use super::align::Map;
+use crate::geometry::{Aabb, Pose, Vec3, median};
+
+/// One scan made ready for registration, sensor frame.
+pub(crate) struct Sample {
+    /// The points that are aligned.
+    pub points: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
+    /// Denser points: the map is made of them.
+    pub targets: Vec<Vec3>,
+    pub target_normals: Vec<Vec3>,
+    /// Unit vectors along their rays, away from the sensor.
+    pub target_rays: Vec<Vec3>,
+    /// Distance between the targets, metres.
+    pub target_spacing: f64,
+    pub noise: f64,
+    /// Median distance of the points from the sensor, metres.
+    pub distance: f64,
+    /// Diagonal of the points' box, metres.
+    pub extent: f64,
+}
+
+impl Sample {
+    pub(crate) fn new(scan: &PreparedScan, count: usize) -> Sample {
+        let kept = scan.sample(count);
+        let points: Vec<Vec3> = kept.iter().map(|&i| scan.points[i]).collect();
+        let dense = scan.sample(TARGETS);
+        let targets: Vec<Vec3> = dense.iter().map(|&i| scan.points[i]).collect();
+        Sample {
+            normals: kept.iter().map(|&i| scan.normals[i]).collect(),
+            noise: scan.noise.max(1e-6),
+            target_spacing: scan.spacing
+                * (scan.points.len() as f64 / targets.len().max(1) as f64).sqrt(),
+            distance: median(points.iter().map(Vec3::norm).collect()).unwrap_or(0.0),
+            extent: Aabb::of(&targets).diagonal(),
+            target_rays: dense.iter().map(|&i| scan.rays[i]).collect(),
+            target_normals: dense.iter().map(|&i| scan.normals[i]).collect(),
+            targets,
+            points,
+        }
+    }
+
+    /// Adds the targets, seen from `pose`, to the map.
+    pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
+        map.insert(&self.targets, &self.target_normals, pose);
+    }
+
+    /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
+    pub(crate) fn reach(&self, noise: f64) -> f64 {
+        (3.0 * self.target_spacing).max(4.0 * noise)
+    }
+}
+
+/// Targets kept of a scan: at a tenth of a million, searches take longer and find nothing better.
+const TARGETS: usize = 40_000;
