@@ -3,7 +3,8 @@
 //! The laser's fan lies in the xz plane of the sensor frame, and the arm carries it along y. The camera stands
 //! beside the laser along y, so that what it cannot see is a triangulation shadow.
 
-use super::noise::{Dice, Edge, FLYING, GOOD, OUTLIER, Use, edge, flying_depth, normal};
+use super::labels::{FLYING, GOOD, OUTLIER};
+use super::noise::{Dice, Edge, Use, edge, flying_depth, normal};
 use super::scene::{Hit, Scene};
 use super::{SimulateParams, f32s};
 use crate::geometry::{Pose, Scan, StriperModel, Vec3};

@@ -6,6 +6,7 @@
 //! depend neither on the threads nor on the order of the views.
 
 mod cell;
+mod labels;
 mod laser;
 mod noise;
 pub mod objects;
@@ -15,7 +16,8 @@ mod stereo;
 mod views;
 
 pub use cell::{Cell, sensor_of};
-pub use noise::{FLYING, GOOD, NoiseFamily, OUTLIER, SURROUNDINGS};
+pub use labels::{FLYING, GOOD, OUTLIER, SURROUNDINGS};
+pub use noise::NoiseFamily;
 pub use views::view_poses;
 
 use crate::geometry::{Pose, Scan, SensorModel, Vec3};

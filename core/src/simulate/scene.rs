@@ -1,6 +1,6 @@
 //! Rays into the true object.
 
-use super::noise::{GOOD, SURROUNDINGS};
+use super::labels::{GOOD, SURROUNDINGS};
 use crate::Result;
 use crate::geometry::{Aabb, Pose, Surface, Vec3};
 use crate::mesh::Mesh;

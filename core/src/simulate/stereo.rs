@@ -3,9 +3,8 @@
 //! The sensor frame is the left camera's. Depth is z = f b / d with focal length f (pixels), baseline b and
 //! disparity d, so a disparity error s gives z^2 / (f b) s: at 0.65 m 1.3 mm for the noise below.
 
-use super::noise::{
-    Dice, Edge, FLYING, GOOD, OUTLIER, Use, correlated, edge, flying_depth, normal,
-};
+use super::labels::{FLYING, GOOD, OUTLIER};
+use super::noise::{Dice, Edge, Use, correlated, edge, flying_depth, normal};
 use super::scene::{Hit, Scene};
 use super::{SimulateParams, f32s};
 use crate::geometry::{Pose, Scan, StereoModel, Vec3};

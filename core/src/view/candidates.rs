@@ -1,7 +1,8 @@
 //! Candidates for the next view (Wiedemann 2014, §2.2.1).
 
+use super::cell::State;
 use super::looking_along;
-use super::space::{State, ViewSpace};
+use super::space::ViewSpace;
 use crate::geometry::{Pose, Vec3};
 use rayon::prelude::*;
 

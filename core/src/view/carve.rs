@@ -1,6 +1,6 @@
 //! What one scan says of the voxels.
 
-use super::space::{Cell, State};
+use super::cell::{Cell, State};
 use crate::geometry::{Pose, Scan, Vec3};
 use crate::voxel::{BlockGrid, SlotSet};
 use nalgebra::Point3;

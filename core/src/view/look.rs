@@ -1,7 +1,8 @@
 //! Simulated scans through the voxel space (Wiedemann 2014, §2.2.1).
 
+use super::cell::{Cell, State};
 use super::params::ray_spacing;
-use super::space::{Cell, State, ViewSpace};
+use super::space::ViewSpace;
 use crate::geometry::{Pose, SensorModel, SensorRay, Vec3};
 use crate::voxel::SlotSet;
 use nalgebra::Point3;

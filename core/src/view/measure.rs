@@ -5,8 +5,9 @@
 //! after Loriot et al. 2008: angle to the mass vector sum, `w = theta / theta_max`.
 
 use super::candidates::outward;
+use super::cell::{Cell, State};
 use super::look::{Eye, look};
-use super::space::{Cell, State, ViewSpace};
+use super::space::ViewSpace;
 use super::{Measure, ViewParams};
 use crate::geometry::{Pose, Vec3};
 use crate::voxel::SlotSet;

@@ -6,6 +6,7 @@
 
 mod candidates;
 mod carve;
+mod cell;
 mod first;
 mod look;
 mod measure;
@@ -13,9 +14,10 @@ mod params;
 mod plan;
 mod space;
 
+pub use cell::{Counts, State};
 pub use params::{Measure, Utility, ViewParams};
 pub use plan::{Candidate, ChosenView, Plan, ReachedView, next_view};
-pub use space::{Counts, State, ViewSpace};
+pub use space::ViewSpace;
 
 use crate::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};

@@ -1,9 +1,10 @@
 //! The choice of the next view.
 
 use super::candidates::{candidates, is_used};
+use super::cell::Counts;
 use super::first::{predefined, spread};
 use super::measure::{Gain, Judge, scramble};
-use super::space::{Counts, ViewSpace};
+use super::space::ViewSpace;
 use super::{Measure, Utility};
 use crate::geometry::Pose;
 use rayon::prelude::*;
