@@ -21,8 +21,8 @@ use rayon::prelude::*;
 
 /// The search radius shrinks to its end by this factor a pass.
 const SHRINK: f64 = 0.6;
-/// A step below this many standard deviations of a pose does not matter any more.
-const SMALL_STEP: f64 = 0.05;
+/// A step below this many standard deviations of a pose ends the search: surfels laid anew move poses by half of it.
+const SMALL_STEP: f64 = 0.3;
 /// Surfels along the diagonal of the largest scan at most: finer ones cost time and tell nothing new.
 const FINEST: f64 = 64.0;
 
@@ -181,18 +181,11 @@ impl Measured {
         let (mut hessian, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
         let mut of_surfel: Vec<Vec<(usize, Twist, f64, f64)>> = vec![Vec::new(); self.surfels];
         for (k, terms) in self.terms.iter().enumerate() {
+            let (mut block, mut rows) = (Mat6::zeros(), Twist::zeros());
             for term in terms {
-                of_surfel[term.surfel as usize].push((
-                    k,
-                    term.jacobian,
-                    self.information(term),
-                    term.residual,
-                ));
-            }
-            let mut block = Mat6::zeros();
-            let mut rows = Twist::zeros();
-            for term in terms.iter() {
                 let information = self.information(term);
+                let seen = (k, term.jacobian, information, term.residual);
+                of_surfel[term.surfel as usize].push(seen);
                 block += term.jacobian * term.jacobian.transpose() * information;
                 rows += term.jacobian * (term.residual * information);
             }
