@@ -10,6 +10,7 @@ mod align;
 mod correlation;
 mod factors;
 mod joint;
+mod pair;
 mod prepare;
 mod registrar;
 mod sample;
@@ -18,6 +19,7 @@ mod stages;
 mod surfels;
 mod verdict;
 
+pub use pair::{PairScan, align_pair};
 pub use prepare::PreparedScan;
 pub use registrar::Registrar;
 pub use verdict::{Status, Verdict};

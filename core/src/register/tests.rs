@@ -205,3 +205,19 @@ fn scans_that_come_one_by_one_are_placed_put_aside_and_refined_as_all_at_once() 
     assert_eq!(refined.poses, at_once.poses);
     assert_eq!(registrar.pose(3), at_once.poses[3]);
 }
+
+#[test]
+fn a_pair_comes_together_whatever_the_order() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let ready: Vec<PairScan> = case.scans.iter().map(|s| PairScan::new(s, &params)).collect();
+    for (moving, fixed) in [(0, 1), (1, 0), (5, 4)] {
+        let relative = |poses: &[Pose]| poses[fixed].inverse() * poses[moving];
+        let guess = relative(&case.robot);
+        let (pose, verdict) = align_pair(&ready[moving], &ready[fixed], &guess, SIGMA, &params);
+        assert_eq!(verdict.status, Status::Accepted, "{}", verdict.reason);
+        let [before, after] =
+            [guess, pose].map(|p| log(&(relative(&case.truth).inverse() * p)).norm());
+        assert!(after < 0.3 * before, "{moving} to {fixed}: {before} to {after}");
+    }
+}

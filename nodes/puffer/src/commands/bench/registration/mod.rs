@@ -1,0 +1,114 @@
+//! `puffer bench registration`: how far registered poses are from the truth, on simulated scans.
+
+mod found;
+mod row;
+
+use crate::commands::simulate::{truth_of, write_folder};
+use crate::failure::usage;
+use crate::parameters::ParameterArgs;
+use crate::table::print_text;
+use anyhow::{Context, Result};
+use clap::Args;
+use found::Found;
+use puffer_core::Progress;
+use puffer_core::mesh::Mesh;
+use puffer_core::params::ParamValue;
+use puffer_core::register::RegisterParams;
+use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, simulate};
+use row::{heading, measure, worst};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Registers simulated scans and measures the poses against the true ones, over several seeds.
+#[derive(Args)]
+pub struct Registration {
+    /// Objects by name, or closed mesh files in metres
+    #[arg(long, value_delimiter = ',', default_value = "filter,coffee,mug")]
+    objects: Vec<String>,
+    /// Noise families
+    #[arg(long, value_delimiter = ',', default_value = "P2K,P2,P3")]
+    noise: Vec<String>,
+    /// Seeds
+    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4,5")]
+    seeds: Vec<u64>,
+    /// Views of each object
+    #[arg(long, default_value_t = SimulateParams::default().views)]
+    views: usize,
+    /// Also writes each case as a scan folder with its truth, for other programs to be measured on
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// Measures the poses in CASE.NAME.json beside the folders kept, instead of registering: another program's
+    #[arg(long, value_name = "NAME", requires = "keep")]
+    judge: Option<String>,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+    /// Print a JSON object a case instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is registered.
+struct Case {
+    object: String,
+    family: NoiseFamily,
+    seed: u64,
+}
+
+impl Case {
+    fn name(&self) -> String {
+        format!("{}_{:?}_{}", self.object, self.family, self.seed)
+    }
+}
+
+impl Registration {
+    pub(super) fn run(&self) -> Result<()> {
+        let params = self.parameters.load()?.register;
+        let families: Vec<NoiseFamily> =
+            self.noise.iter().map(|word| family(word)).collect::<Result<_>>()?;
+        if !self.json {
+            print_text(&heading());
+        }
+        for object in &self.objects {
+            let truth = truth_of(object)?;
+            let name = Path::new(object).file_stem().unwrap_or_default().to_string_lossy();
+            for &family in &families {
+                let mut rows = Vec::new();
+                for &seed in &self.seeds {
+                    let of = SimulateParams { family, views: self.views, ..Default::default() };
+                    let scans = simulate(&truth, &of, seed, &Progress::silent())?;
+                    let case = Case { object: name.to_string(), family, seed };
+                    let found = self.register(&case, &truth, &scans, &params)?;
+                    let row = measure(case, &truth, &scans, found)?;
+                    print_text(&if self.json { format!("{}\n", row.json()) } else { row.line() });
+                    rows.push(row);
+                }
+                if !self.json && rows.len() > 1 {
+                    print_text(&worst(&rows));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn register(
+        &self,
+        case: &Case,
+        truth: &Mesh,
+        scans: &SimulatedScans,
+        params: &RegisterParams,
+    ) -> Result<Found> {
+        if let (Some(name), Some(folder)) = (&self.judge, &self.keep) {
+            return Found::foreign(&folder.join(format!("{}.{name}.json", case.name())), scans);
+        }
+        if let Some(folder) = &self.keep {
+            write_folder(&folder.join(case.name()), truth, scans)?;
+        }
+        Found::ours(scans, params).with_context(|| case.name())
+    }
+}
+
+fn family(word: &str) -> Result<NoiseFamily> {
+    NoiseFamily::from_value(&Value::from(word)).ok_or_else(|| {
+        usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
+    })
+}
