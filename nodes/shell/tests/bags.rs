@@ -127,10 +127,18 @@ async fn a_bag_is_played_with_its_timing_to_those_who_listen() {
         all
     });
     let begun = std::time::Instant::now();
-    let count = player.play(bag.messages(&[]).unwrap(), Some(0.5)).await.unwrap();
-    assert_eq!(count, 11, "all but the topic that is not named");
-    // The last message lies 0.4 s after the first, and it is played at half the speed.
-    assert!(begun.elapsed().as_secs_f64() >= 0.8);
+    let mut asked = 0;
+    let hold_up = async |_: &BagMessage| {
+        asked += 1;
+        if asked == 2 {
+            tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+        }
+        Ok(())
+    };
+    let count = player.play(bag.messages(&[]).unwrap(), Some(0.5), hold_up).await.unwrap();
+    assert_eq!((count, asked), (11, 11), "all but the topic that is not named");
+    // The last message lies 0.4 s after the first, and it is played at half the speed; and it was held up.
+    assert!(begun.elapsed().as_secs_f64() >= 1.1);
     player.flush(SOON).await.unwrap();
     for k in 0..5 {
         assert_eq!(heard.next_within(SOON).await.unwrap(), tick(k));
@@ -138,9 +146,13 @@ async fn a_bag_is_played_with_its_timing_to_those_who_listen() {
     assert_eq!(late.next_within(SOON).await.unwrap(), tick(-1));
     assert!(taken.await.unwrap() == (0..5).map(cloud).collect::<Vec<_>>());
 
-    assert!(player.play(bag.messages(&[]).unwrap(), Some(0.0)).await.is_err());
+    let refuse = async |_: &BagMessage| Err(anyhow::anyhow!("not yet"));
+    let refused = player.play(bag.messages(&[]).unwrap(), None, refuse).await.unwrap_err();
+    assert_eq!(refused.to_string(), "not yet");
+    let free = async |_: &BagMessage| Ok(());
+    assert!(player.play(bag.messages(&[]).unwrap(), Some(0.0), free).await.is_err());
     speaker.stop().stop();
-    assert_eq!(player.play(bag.messages(&[]).unwrap(), Some(1.0)).await.unwrap(), 0);
+    assert_eq!(player.play(bag.messages(&[]).unwrap(), Some(1.0), free).await.unwrap(), 0);
 }
 
 #[tokio::test(flavor = "multi_thread")]

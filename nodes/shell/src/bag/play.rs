@@ -86,24 +86,37 @@ impl Player {
     /// Publishes the messages at their times, `rate` times as fast; without a rate as fast as they go out, which plain
     /// topics with slow readers do not survive whole. Ends early when the node stops. Returns how many it published.
     ///
+    /// Each message waits for `before`, and while it waits the bag's time stands still: who must not be outrun can hold
+    /// the player up.
+    ///
     /// # Errors
-    /// A rate that is none, a bag that cannot be read on, or a message that cannot be published.
-    pub async fn play(&self, messages: Messages, rate: Option<f64>) -> Result<u64> {
+    /// A rate that is none, a bag that cannot be read on, a message that cannot be published, or what `before` says.
+    pub async fn play(
+        &self,
+        messages: Messages,
+        rate: Option<f64>,
+        mut before: impl AsyncFnMut(&BagMessage) -> Result<()>,
+    ) -> Result<u64> {
         if rate.is_some_and(|rate| !rate.is_finite() || rate <= 0.0) {
             bail!("rate {:?}: it must be a number above 0", rate.unwrap_or_default());
         }
         let mut messages = read_ahead(messages);
         let mut first = None;
+        let mut held = Duration::ZERO;
         let mut count = 0;
         while let Some(Some(message)) = self.stop.or(messages.recv()).await {
             let message = message?;
             let Some(outlet) = self.outlets.get(&*message.topic) else { continue };
+            let since = Instant::now();
+            let Some(free) = self.stop.or(before(&message)).await else { break };
+            free?;
+            held += since.elapsed();
             if let Some(rate) = rate {
                 let (start, begun) = *first.get_or_insert((message.log_time, Instant::now()));
                 let offset = message.log_time.seconds_since(start).max(0.0) / rate;
                 let offset = Duration::try_from_secs_f64(offset)
                     .with_context(|| format!("rate {rate}: too slow"))?;
-                if self.stop.or(tokio::time::sleep_until(begun + offset)).await.is_none() {
+                if self.stop.or(tokio::time::sleep_until(begun + held + offset)).await.is_none() {
                     break;
                 }
             }

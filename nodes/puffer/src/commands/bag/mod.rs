@@ -1,5 +1,6 @@
 //! `puffer bag`: bags of ROS 2 messages.
 
+mod finish;
 mod info;
 mod node;
 mod notes;

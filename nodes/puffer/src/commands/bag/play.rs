@@ -1,16 +1,14 @@
 //! `puffer bag play`.
 
+use super::finish::{Finish, Pace};
 use super::node::{interrupted, with_node};
 use super::topics;
 use crate::failure::usage;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, bail};
 use clap::Args;
-use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
-use puffer_msgs::std_srvs::srv::{Trigger, TriggerRequest};
-use puffer_shell::bag::{BagReader, BagTopic, Player};
-use puffer_shell::bulk::{BulkSubscription, Delivery};
-use puffer_shell::{Client, Interface, NoParams, Node, Stop};
+use puffer_shell::bag::{BagMessage, BagReader, BagTopic, Player};
+use puffer_shell::{Interface, NoParams, Node, Stop};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -19,10 +17,6 @@ use std::time::Duration;
 const READERS_DEADLINE: Duration = Duration::from_secs(15);
 /// How long the last messages may take to arrive.
 const FLUSH_DEADLINE: Duration = Duration::from_secs(60);
-/// How long the registrar may take over the next scan once all are sent.
-const SCAN_DEADLINE: Duration = Duration::from_secs(120);
-/// How long the mesh may take; each of its steps has a deadline of its own.
-const FINISH_DEADLINE: Duration = Duration::from_secs(3600);
 
 /// Publishes what a bag holds on the domain ROS_DOMAIN_ID: without --topics only what came from robot and sensor, so that
 /// running nodes do with it what they did before.
@@ -93,51 +87,24 @@ impl Play {
         }
         let names: Vec<&str> = chosen.iter().map(|t| &*t.name).collect();
         let rate = Some(self.rate).filter(|rate| *rate > 0.0);
-        let count = stop.or(player.play(bag.messages(&names)?, rate)).await;
+        let clouds: BTreeSet<&str> = chosen
+            .iter()
+            .filter(|t| *t.type_name == *PointCloud2::TYPE_NAME)
+            .map(|t| &*t.name)
+            .collect();
+        let mut pace = Pace::default();
+        let before = async |message: &BagMessage| match &finish {
+            Some(finish) => pace.before(message, &clouds, finish).await,
+            None => Ok(()),
+        };
+        let count = stop.or(player.play(bag.messages(&names)?, rate, before)).await;
         let count = count.ok_or_else(interrupted)??;
         stop.or(player.flush(FLUSH_DEADLINE)).await.ok_or_else(interrupted)??;
         eprintln!("{count} messages of {} topics on DDS domain {}", names.len(), node.domain());
         if let Some(finish) = finish {
-            let clouds = chosen.iter().filter(|t| *t.type_name == *PointCloud2::TYPE_NAME);
-            let scans = clouds.map(|t| t.count).sum();
-            println!("{}", stop.or(finish.mesh(scans)).await.ok_or_else(interrupted)??);
+            let mesh = stop.or(finish.mesh(pace.clouds)).await.ok_or_else(interrupted)??;
+            println!("{mesh}");
         }
         Ok(())
-    }
-}
-
-/// What makes a mesh of played scans.
-struct Finish {
-    registered: BulkSubscription<RegisteredScan>,
-    modeller: Client<Trigger>,
-}
-
-impl Finish {
-    fn new(node: &Node<NoParams>) -> Result<Finish> {
-        Ok(Finish {
-            registered: node.bulk_subscribe("registered_scan", Delivery::Every)?,
-            modeller: node.client("modeller/finish")?,
-        })
-    }
-
-    /// Waits for the verdict on each of `scans` scans, then for the mesh; its path.
-    async fn mesh(&self, scans: u64) -> Result<String> {
-        let mut ids = BTreeSet::new();
-        while (ids.len() as u64) < scans {
-            let next = tokio::time::timeout(SCAN_DEADLINE, self.registered.next()).await;
-            let scan = next.map_err(|_| {
-                anyhow!(
-                    "{} of {scans} scans were registered, and no other for {} s: does scan_registrar run?",
-                    ids.len(),
-                    SCAN_DEADLINE.as_secs()
-                )
-            })?;
-            ids.insert(scan.context("registered_scan")?.id);
-        }
-        let answer = self.modeller.call(&TriggerRequest::default(), FINISH_DEADLINE).await?;
-        if !answer.success {
-            bail!("the modeller: {}", answer.message);
-        }
-        Ok(answer.message)
     }
 }
