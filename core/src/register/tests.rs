@@ -218,6 +218,6 @@ fn a_pair_comes_together_whatever_the_order() {
         assert_eq!(verdict.status, Status::Accepted, "{}", verdict.reason);
         let [before, after] =
             [guess, pose].map(|p| log(&(relative(&case.truth).inverse() * p)).norm());
-        assert!(after < 0.3 * before, "{moving} to {fixed}: {before} to {after}");
+        assert!(after < 0.5 * before, "{moving} to {fixed}: {before} to {after}");
     }
 }
