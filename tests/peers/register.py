@@ -7,6 +7,9 @@
 Both peers do the same: pairwise alignment of all scans that overlap at the robot's poses, from coarse to fine, then
 Open3D's pose graph over all pairs. Open3D aligns by point-to-plane ICP, small_gicp by GICP. Neither takes the robot's
 pose as anything but the start.
+
+The settings are a first choice: their pose graphs drift far more than these programs can do (pairs are as expected), so
+no figure of the whole is to be quoted from here before they are better.
 """
 
 import argparse
