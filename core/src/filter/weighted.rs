@@ -5,7 +5,7 @@ use super::FilterParams;
 use super::merged::Merged;
 use super::quadric::{Fit, Measured, fit};
 use crate::geometry::{Cloud, Vec3};
-use crate::voxel::CellIndex;
+use crate::voxel::{CellIndex, keep_apart, sides};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
@@ -44,21 +44,14 @@ fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParams) -> Vec<u
     let cells = CellIndex::new(&merged.points, reduction_radius);
     let cosine = params.max_normal_angle.cos();
     let in_cell = |cell| {
-        let mut members = cells.points_in(cell).to_vec();
-        let mut chosen = Vec::new();
-        while let Some(&first) = members.first() {
-            let side = merged.normals[first as usize];
-            let (same, others): (Vec<u32>, Vec<u32>) =
-                members.into_iter().partition(|&i| merged.normals[i as usize].dot(&side) >= cosine);
+        let central = |same: Vec<u32>| {
             let mean =
                 same.iter().map(|&i| merged.points[i as usize]).sum::<Vec3>() / same.len() as f64;
             let distance = |i: &u32| (merged.points[*i as usize] - mean).norm_squared();
-            chosen.extend(
-                same.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|&i| i as usize),
-            );
-            members = others;
-        }
-        chosen
+            same.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|i| i as usize)
+        };
+        let found = sides(cells.points_in(cell), &merged.normals, cosine);
+        found.into_iter().filter_map(central).collect()
     };
     let chosen: Vec<Vec<usize>> = cells.cells().par_iter().map(|&cell| in_cell(cell)).collect();
     chosen.into_iter().flatten().collect()
@@ -111,27 +104,17 @@ fn mean_normal(merged: &Merged, near: &[usize], start: &Vec3, cosine: f64) -> Op
     })
 }
 
-/// Keeps the best supported points, none closer than 0.7 of the reduction radius to another of its side.
+/// Keeps the best supported points, about a reduction radius from each other on each side.
 fn thin(fits: Vec<Fit>, reduction_radius: f64) -> Cloud {
     let usual = crate::geometry::median(fits.iter().map(|f| f.effective).collect()).unwrap_or(0.0);
     let fits: Vec<Fit> = fits.into_iter().filter(|f| f.effective >= LEAST_SHARE * usual).collect();
     let mut order: Vec<usize> = (0..fits.len()).collect();
     order.sort_by(|&a, &b| fits[b].effective.total_cmp(&fits[a].effective).then(a.cmp(&b)));
     let points: Vec<Vec3> = fits.iter().map(|f| f.point).collect();
-    let cells = CellIndex::new(&points, reduction_radius);
-    let mut dropped = vec![false; fits.len()];
-    let mut kept = vec![false; fits.len()];
-    for i in order {
-        if dropped[i] {
-            continue;
-        }
-        kept[i] = true;
-        cells.for_each_within(&points, &points[i], 0.7 * reduction_radius, |j, _| {
-            dropped[j] |= fits[j].normal.dot(&fits[i].normal) > 0.0;
-        });
-    }
+    let normals: Vec<Vec3> = fits.iter().map(|f| f.normal).collect();
     let mut cloud = Cloud::default();
-    for (fit, _) in fits.iter().zip(kept).filter(|(_, kept)| *kept) {
+    for i in keep_apart(&points, &normals, &order, reduction_radius) {
+        let fit = &fits[i];
         cloud.push(fit.point, fit.normal, fit.sigma, fit.support);
     }
     cloud.sigma = pooled_sigma(&cloud, POOL * reduction_radius);

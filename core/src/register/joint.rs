@@ -160,8 +160,8 @@ impl Measured {
         let mut terms = look(at.reach);
         let scale = spread(&terms, count).max(floor);
         terms = look(scale);
-        let (between, within) = variances(&terms, count, floor);
         let heights = heights(&terms, count);
+        let (between, within) = variances(&terms, &heights, floor);
         let redundant = deviations(&terms, &heights).count();
         for term in terms.iter_mut().flatten() {
             term.residual -= heights[term.surfel as usize].0;
@@ -241,16 +241,15 @@ fn spread(terms: &[Vec<Term>], surfels: usize) -> f64 {
 }
 
 /// Variances between and within the scans' measurements, square metres.
-fn variances(terms: &[Vec<Term>], surfels: usize, floor: f64) -> (f64, f64) {
+fn variances(terms: &[Vec<Term>], heights: &[(f64, f64)], floor: f64) -> (f64, f64) {
     let (mut square, mut points) = (0.0, 0.0);
     for term in terms.iter().flatten().filter(|t| t.weight > 2.0) {
         square += term.variance * term.weight;
         points += term.weight - 1.0;
     }
     let within = square / f64::max(points, 1.0);
-    let heights = heights(terms, surfels);
     let (mut square, mut white, mut count) = (0.0, 0.0, 0.0);
-    for (deviation, term) in deviations(terms, &heights) {
+    for (deviation, term) in deviations(terms, heights) {
         square += deviation * deviation;
         white += within / term.weight;
         count += 1.0;

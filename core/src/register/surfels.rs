@@ -5,7 +5,7 @@
 
 use super::sample::Sample;
 use crate::geometry::{KdTree, Pose, Twist, Vec3};
-use crate::voxel::CellIndex;
+use crate::voxel::{CellIndex, keep_apart, sides};
 use rayon::prelude::*;
 
 use super::factors::{point_to_plane, tukey};
@@ -56,8 +56,6 @@ const POINTS: usize = 12_000;
 const RAY_STEPS: usize = 3;
 /// Cosine of the incidence (80 degrees) beyond which a ray meets the surface nowhere in particular.
 const GRAZING: f64 = 0.17;
-/// Surfels of the same side nearer to each other than this share of their distance are one.
-const OVERLAP: f64 = 0.7;
 /// How far centres are lifted along their normals in the search tree, in distances between surfels: enough to tell the
 /// sides of a wall that is thinner than that. Much more would hold a measurement to surfels of its own, noisy normal.
 const LIFT: f64 = 0.2;
@@ -78,35 +76,23 @@ impl Surfels {
             .collect();
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = placed.into_iter().unzip();
         let cells = CellIndex::new(&points, edge);
-        let found: Vec<Vec<(Vec3, Vec3, usize)>> = cells
-            .cells()
-            .par_iter()
-            .map(|&cell| sides(&points, &normals, cells.points_in(cell), cosine))
-            .collect();
-        Surfels::thinned(found.concat(), edge)
+        let patch = |side: &Vec<u32>| patch(&points, &normals, side);
+        let in_cell = |&cell| -> Vec<(Vec3, Vec3, usize)> {
+            sides(cells.points_in(cell), &normals, cosine).iter().filter_map(patch).collect()
+        };
+        let found: Vec<_> = cells.cells().par_iter().map(in_cell).collect();
+        Surfels::thinned(&found.concat(), edge)
     }
 
     /// Keeps the best supported surfels.
-    fn thinned(found: Vec<(Vec3, Vec3, usize)>, edge: f64) -> Surfels {
+    fn thinned(found: &[(Vec3, Vec3, usize)], edge: f64) -> Surfels {
         let centers: Vec<Vec3> = found.iter().map(|f| f.0).collect();
+        let normals: Vec<Vec3> = found.iter().map(|f| f.1).collect();
         let mut order: Vec<usize> = (0..found.len()).collect();
         order.sort_by_key(|&i| (std::cmp::Reverse(found[i].2), i));
-        let cells = CellIndex::new(&centers, edge);
-        let mut dropped = vec![false; found.len()];
-        let mut kept = Vec::new();
-        for i in order {
-            if dropped[i] {
-                continue;
-            }
-            kept.push(i);
-            cells.for_each_within(&centers, &centers[i], OVERLAP * edge, |j, _| {
-                dropped[j] |= found[j].1.dot(&found[i].1) > 0.0;
-            });
-        }
-        kept.sort_unstable();
-        let normals: Vec<Vec3> = kept.iter().map(|&i| found[i].1).collect();
-        let centers: Vec<Vec3> = kept.iter().map(|&i| centers[i]).collect();
-        Surfels::of(centers, normals, edge)
+        let kept = keep_apart(&centers, &normals, &order, edge);
+        let of = |all: &[Vec3]| kept.iter().map(|&i| all[i]).collect();
+        Surfels::of(of(&centers), of(&normals), edge)
     }
 
     /// Surfels with these centres (metres) and unit normals, `edge` apart.
@@ -213,26 +199,11 @@ fn lifted(point: &Vec3, normal: &Vec3, edge: f64) -> Vec3 {
     point + normal * (LIFT * edge)
 }
 
-/// Centre, mean normal and number of points of each side of the surface in a cell.
-fn sides(
-    points: &[Vec3],
-    normals: &[Vec3],
-    members: &[u32],
-    cosine: f64,
-) -> Vec<(Vec3, Vec3, usize)> {
-    let mut members = members.to_vec();
-    let mut found = Vec::new();
-    while let Some(&first) = members.first() {
-        let axis = normals[first as usize];
-        let (same, others): (Vec<u32>, Vec<u32>) =
-            members.into_iter().partition(|&i| normals[i as usize].dot(&axis) >= cosine);
-        let count = same.len();
-        let center = same.iter().map(|&i| points[i as usize]).sum::<Vec3>() / count as f64;
-        let normal = same.iter().map(|&i| normals[i as usize]).sum::<Vec3>();
-        found.extend(normal.try_normalize(1e-9).map(|normal| (center, normal, count)));
-        members = others;
-    }
-    found
+/// Centre, mean normal and number of the points of one side of the surface in a cell.
+fn patch(points: &[Vec3], normals: &[Vec3], members: &[u32]) -> Option<(Vec3, Vec3, usize)> {
+    let sum = |of: &[Vec3]| members.iter().map(|&i| of[i as usize]).sum::<Vec3>();
+    let center = sum(points) / members.len() as f64;
+    sum(normals).try_normalize(1e-9).map(|normal| (center, normal, members.len()))
 }
 
 #[cfg(test)]

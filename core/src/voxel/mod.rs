@@ -7,12 +7,14 @@
 mod cells;
 mod grid;
 mod set;
+mod sides;
 mod space;
 mod walk;
 
 pub use cells::CellIndex;
 pub use grid::{BlockGrid, Step, Walk};
 pub use set::SlotSet;
+pub(crate) use sides::{keep_apart, sides};
 pub use space::VoxelSpace;
 pub use walk::walk;
 
