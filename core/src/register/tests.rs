@@ -173,7 +173,8 @@ fn a_cancelled_registration_stops() {
 #[test]
 fn scans_that_come_one_by_one_are_placed_put_aside_and_refined_as_all_at_once() {
     let case = case(SIGMA);
-    let params = RegisterParams::default();
+    // The noise of these scans is white: its neighbours tell something new.
+    let params = RegisterParams { information_share: 0.1, ..RegisterParams::default() };
     let mut registrar = Registrar::new(SIGMA, params.clone());
     // The fourth looks from the other side: it has to wait for those between.
     let order = [0, 4, 1, 2, 3, 5, 6, 7];
@@ -195,8 +196,7 @@ fn scans_that_come_one_by_one_are_placed_put_aside_and_refined_as_all_at_once() 
     let sorted = |values: &[Pose]| order.iter().map(|&i| values[i]).collect::<Vec<_>>();
     let poses: Vec<Pose> = (0..order.len()).map(|n| registrar.pose(n)).collect();
     let off = error(&poses, &sorted(&case.truth));
-    // Each was aligned only to those before it: a third of the standard deviation of the poses.
-    assert!(off < 7e-4, "{off}");
+    assert!(off < 5e-4, "{off}");
 
     let refined = registrar.refine(&Progress::silent()).unwrap();
     let scans: Vec<PreparedScan> = order.iter().map(|&i| case.scans[i].clone()).collect();
