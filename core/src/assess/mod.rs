@@ -18,9 +18,10 @@ mod topology;
 pub use align::{Alignment, align};
 pub use calibration::{Calibration, calibration};
 pub use distances::{Distances, RawDistances, Spread};
-pub use poses::{PoseErrors, PosedHits, pose_errors};
+pub use poses::{PoseErrors, PosedHits, pair_error, pose_errors};
 pub use reference::{Nearest, Reference, distance_to_open_truth};
 pub use sample::{Sample, sample_surface};
+pub use stats::quantile;
 pub use topology::{Topology, topology};
 
 use crate::geometry::{KdTree, Pose, Vec3};
@@ -30,7 +31,7 @@ use align::apply;
 use distances::{MM, OneWay};
 use reference::covered;
 use serde::Serialize;
-use stats::{quantile, rms, share};
+use stats::{rms, share};
 
 /// What to measure with.
 #[derive(Clone, Debug)]

@@ -68,6 +68,14 @@ pub fn pose_errors(views: &[PosedHits], truth: &Mesh, progress: &Progress) -> Re
     Ok(PoseErrors { full: rms(&full) * MM, normal: rms(&normal) * MM, surface: surface * MM })
 }
 
+/// Error of the alignment of one view to another, mm: root mean square distance between where the pose
+/// `fixed_from_moving` and the true poses put the hits of `moving`.
+pub fn pair_error(moving: &PosedHits, fixed: &PosedHits, fixed_from_moving: &Pose) -> f64 {
+    let truth = fixed.truth.inverse() * moving.truth;
+    let error = |hit| (apply(fixed_from_moving, hit) - apply(&truth, hit)).norm();
+    rms(&moving.hits.iter().map(error).collect::<Vec<f64>>()) * MM
+}
+
 /// Root mean square distance of the nearest points to the surface after a fit to it that starts at `start`.
 fn surface_error(
     points: &[Vec3],
@@ -128,5 +136,14 @@ mod tests {
         let expected = (0.07f64 * 0.05 / (0.07 * 0.05 + 0.1 * 0.05 + 0.1 * 0.07)).sqrt();
         assert!((errors.normal - expected).abs() < 0.1, "{errors:?}");
         assert!(errors.surface < errors.normal, "{errors:?}");
+    }
+
+    #[test]
+    fn a_pair_is_as_far_off_as_its_pose() {
+        let (views, _) = views(|_| Twist::zeros());
+        let exact = views[1].truth.inverse() * views[0].truth;
+        assert!(pair_error(&views[0], &views[1], &exact) < 1e-9);
+        let off = exp(&Twist::new(0.003, 0.0, 0.004, 0.0, 0.0, 0.0)) * exact;
+        assert!((pair_error(&views[0], &views[1], &off) - 5.0).abs() < 1e-9);
     }
 }

@@ -16,7 +16,7 @@ pub(crate) fn share(values: &[f64], holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// The value below which the share `fraction` lies, linear between order statistics; NaN of nothing.
-pub(crate) fn quantile(values: &[f64], fraction: f64) -> f64 {
+pub fn quantile(values: &[f64], fraction: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };

@@ -12,8 +12,9 @@ use std::time::Instant;
 /// Poses `object_from_sensor`, the alignments of pairs, and the seconds that they took.
 pub(super) struct Found {
     pub poses: Vec<Pose>,
-    pub refused: usize,
-    pub prepare: f64,
+    /// Scans that are not accepted; none for a program that gives no verdicts.
+    pub refused: Option<usize>,
+    pub prepare: Option<f64>,
     pub register: f64,
     pub pairs: Vec<Pair>,
 }
@@ -65,9 +66,9 @@ impl Found {
         let sigma = Some(scans.pose_sigma);
         let found = register(&prepared, &reported(scans), sigma, params, &Progress::silent())?;
         Ok(Found {
-            refused: found.verdicts.iter().filter(|v| v.status != Status::Accepted).count(),
+            refused: Some(found.verdicts.iter().filter(|v| v.status != Status::Accepted).count()),
             poses: found.poses,
-            prepare,
+            prepare: Some(prepare),
             register: started.elapsed().as_secs_f64(),
             pairs: pairs(scans, &prepared, params)?,
         })
@@ -100,8 +101,8 @@ impl Found {
         let pose = |view: &ForeignView| pose_from_rows(&view.object_from_sensor);
         Ok(Found {
             poses: written.views.iter().map(pose).collect::<puffer_core::Result<_>>()?,
-            refused: 0,
-            prepare: f64::NAN,
+            refused: None,
+            prepare: None,
             register: written.seconds,
             pairs: written.pairs.iter().map(pair).collect::<puffer_core::Result<_>>()?,
         })

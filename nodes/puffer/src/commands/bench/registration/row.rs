@@ -4,7 +4,7 @@ use super::Case;
 use super::found::{Found, Pair, reported};
 use anyhow::Result;
 use puffer_core::Progress;
-use puffer_core::assess::{PoseErrors, PosedHits, pose_errors};
+use puffer_core::assess::{PoseErrors, PosedHits, pair_error, pose_errors, quantile};
 use puffer_core::geometry::{Pose, Vec3};
 use puffer_core::mesh::Mesh;
 use puffer_core::simulate::{SimulatedScans, SimulatedView};
@@ -21,7 +21,7 @@ pub(super) struct Row {
     case: Case,
     found: Found,
     robot: PoseErrors,
-    ours: PoseErrors,
+    errors: PoseErrors,
     /// Root mean square distance between where the estimated and the true pose put the hits of each pair's moving scan,
     /// mm.
     pair_errors: Vec<f64>,
@@ -33,23 +33,19 @@ pub(super) fn measure(
     scans: &SimulatedScans,
     found: Found,
 ) -> Result<Row> {
-    let ours = posed(scans, &found.poses);
+    let posed_hits = posed(scans, &found.poses);
     let errors = |views: &[PosedHits]| pose_errors(views, truth, &Progress::silent());
     Ok(Row {
         robot: errors(&posed(scans, &reported(scans)))?,
-        pair_errors: found.pairs.iter().map(|pair| pair_error(pair, &ours)).collect(),
-        ours: errors(&ours)?,
+        pair_errors: found
+            .pairs
+            .iter()
+            .map(|p| pair_error(&posed_hits[p.moving], &posed_hits[p.fixed], &p.fixed_from_moving))
+            .collect(),
+        errors: errors(&posed_hits)?,
         case,
         found,
     })
-}
-
-fn pair_error(pair: &Pair, views: &[PosedHits]) -> f64 {
-    let truth = views[pair.fixed].truth.inverse() * views[pair.moving].truth;
-    let hits = &views[pair.moving].hits;
-    let place = |pose: &Pose, hit: &Vec3| pose.rotation * hit + pose.translation.vector;
-    let square = |hit| (place(&pair.fixed_from_moving, hit) - place(&truth, hit)).norm_squared();
-    (hits.iter().map(square).sum::<f64>() / hits.len() as f64).sqrt() * 1e3
 }
 
 fn posed(scans: &SimulatedScans, poses: &[Pose]) -> Vec<PosedHits> {
@@ -71,44 +67,48 @@ pub(super) fn heading() -> String {
     "errors in mm: along the normal, full, of the surface; in brackets the robot's own\n".to_owned()
 }
 
-fn figures(ours: &PoseErrors, robot: &PoseErrors) -> String {
+fn figures(found: &PoseErrors, robot: &PoseErrors) -> String {
     format!(
         "normal {:6.3} ({:5.2})  full {:6.3} ({:5.2})  surface {:6.3} ({:5.2})",
-        ours.normal, robot.normal, ours.full, robot.full, ours.surface, robot.surface
+        found.normal, robot.normal, found.full, robot.full, found.surface, robot.surface
     )
 }
 
 pub(super) fn worst(rows: &[Row]) -> String {
-    let largest = |of: fn(&Row) -> f64| rows.iter().map(of).fold(0.0, f64::max);
-    let ours = PoseErrors {
-        normal: largest(|r| r.ours.normal),
-        full: largest(|r| r.ours.full),
-        surface: largest(|r| r.ours.surface),
+    let largest = |of: fn(&Row) -> &PoseErrors| {
+        let of_all =
+            |part: fn(&PoseErrors) -> f64| rows.iter().map(of).map(part).fold(0.0, f64::max);
+        PoseErrors {
+            normal: of_all(|e| e.normal),
+            full: of_all(|e| e.full),
+            surface: of_all(|e| e.surface),
+        }
     };
-    let robot = PoseErrors {
-        normal: largest(|r| r.robot.normal),
-        full: largest(|r| r.robot.full),
-        surface: largest(|r| r.robot.surface),
-    };
-    let refused = rows.iter().map(|r| r.found.refused).max().unwrap_or(0);
+    let refused = rows.iter().filter_map(|r| r.found.refused).max();
     format!(
-        "{:<12} {:<4} worst  {}  refused {refused}\n",
+        "{:<12} {:<4} worst  {}  {}\n",
         rows[0].case.object,
         format!("{:?}", rows[0].case.family),
-        figures(&ours, &robot)
+        figures(&largest(|r| &r.errors), &largest(|r| &r.robot)),
+        refusals(refused).trim_end()
     )
+}
+
+/// Empty for a program that refuses nothing.
+fn refusals(refused: Option<usize>) -> String {
+    refused.map(|count| format!("refused {count}  ")).unwrap_or_default()
 }
 
 impl Row {
     pub(super) fn line(&self) -> String {
         format!(
-            "{:<12} {:<4} {:>5}  {}  refused {}  prepare {:.1} s, register {:.1} s\n",
+            "{:<12} {:<4} {:>5}  {}  {}{}register {:.1} s\n",
             self.case.object,
             format!("{:?}", self.case.family),
             self.case.seed,
-            figures(&self.ours, &self.robot),
-            self.found.refused,
-            self.found.prepare,
+            figures(&self.errors, &self.robot),
+            refusals(self.found.refused),
+            self.found.prepare.map(|s| format!("prepare {s:.1} s, ")).unwrap_or_default(),
             self.found.register
         ) + &self.pairs_line()
     }
@@ -138,7 +138,7 @@ impl Row {
             |e: &PoseErrors| json!({ "normal": e.normal, "full": e.full, "surface": e.surface });
         json!({
             "object": self.case.object, "noise": format!("{:?}", self.case.family),
-            "seed": self.case.seed, "found": errors(&self.ours), "robot": errors(&self.robot),
+            "seed": self.case.seed, "found": errors(&self.errors), "robot": errors(&self.robot),
             "refused": self.found.refused, "prepare_seconds": self.found.prepare,
             "register_seconds": self.found.register, "pair_errors": self.pair_errors,
             "pair_milliseconds":
@@ -146,12 +146,4 @@ impl Row {
             "pairs_accepted": self.found.pairs.iter().map(|p| p.accepted).collect::<Vec<bool>>(),
         })
     }
-}
-
-/// The value below which the share `fraction` lies; NaN of nothing.
-fn quantile(values: &[f64], fraction: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1) as f64;
-    sorted.get((fraction * last).round() as usize).copied().unwrap_or(f64::NAN)
 }
