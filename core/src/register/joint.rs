@@ -2,19 +2,18 @@
 //! (multi-view registration; Pulli 1999 for the problem, Barfoot 2017 for the perturbations). No scan is fixed, so
 //! that the error is spread and the priors alone place the whole.
 //!
-//! The height of each patch of the surface is an unknown of its own. Eliminated, it leaves for the patch's
-//! measurements r_i with weights w_i
-//!
-//! ```text
-//! sum_i w_i (r_i - m)^2,    m = sum_i w_i r_i / sum_i w_i.                              (1)
-//! ```
+//! The height of each patch of the surface is an unknown of its own, eliminated in `equations`: each measurement counts
+//! once, however many scans saw the same place. What neighbouring measurements of one scan share in noise is learnt from
+//! the residuals (`correlation`) and taken out (`whiten`).
 
-use super::correlation::effective_share;
+use super::correlation::{Correlation, Residuals};
+use super::equations::{Row, reduced};
 use super::sample::Sample;
 use super::surfels::{Surfels, Term};
 use super::verdict::Status;
+use super::whiten::{WhiteRow, whiten};
 use super::{RegisterParams, Registration};
-use crate::geometry::{Mat6, Pose, Twist, exp, log, median};
+use crate::geometry::{Mat6, Pose, Twist, Vec3, exp, log, median};
 use crate::{Error, Progress, Result};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -23,6 +22,8 @@ use rayon::prelude::*;
 const SHRINK: f64 = 0.6;
 /// A step below this many standard deviations of a pose ends the search: surfels laid anew move poses by half of it.
 const SMALL_STEP: f64 = 0.3;
+/// Steps at the finest scale are this much longer (over-relaxation; below 2 it converges).
+const RELAXATION: f64 = 1.7;
 /// Surfels along the diagonal of the largest scan at most: finer ones cost time and tell nothing new.
 const FINEST: f64 = 64.0;
 
@@ -48,7 +49,7 @@ pub(crate) fn optimise(
         progress.report("optimise", pass as f64 / params.joint_iterations as f64)?;
         let at_end = now.reach <= end.reach;
         let found = Measured::new(&scans, &poses, now, at_end, params);
-        let (geometry, mut gradient) = found.system();
+        let (geometry, mut gradient) = found.system()?;
         hessian = geometry;
         for (k, pose) in poses.iter().enumerate() {
             let mut block = hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k);
@@ -62,12 +63,15 @@ pub(crate) fn optimise(
             ));
         };
         let step = solver.solve(&-gradient);
+        // New surfels follow the scans that they are made of: a full step goes a part of the way only.
+        let last = pass + 1 == params.joint_iterations;
+        let relaxation = if at_end && !last { RELAXATION } else { 1.0 };
         let mut moved = 0.0_f64;
         for (k, pose) in poses.iter_mut().enumerate() {
             let xi: Twist = step.fixed_rows::<6>(6 * k).into_owned();
             let block: Mat6 = hessian.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
             moved = moved.max(xi.dot(&(block * xi)).sqrt());
-            *pose *= exp(&xi);
+            *pose *= exp(&(xi * relaxation));
         }
         if at_end && moved < SMALL_STEP {
             break;
@@ -132,8 +136,9 @@ struct Measured {
     /// Variance of a measurement of `n` points: `between + within / n`, square metres.
     between: f64,
     within: f64,
-    /// What a measurement counts for, given its neighbours' share in the same noise.
+    /// What a measurement counts for beside the priors, and what its neighbours share with it.
     share: f64,
+    correlation: Correlation,
 }
 
 impl Measured {
@@ -166,45 +171,60 @@ impl Measured {
         for term in terms.iter_mut().flatten() {
             term.residual -= heights[term.surfel as usize].0;
         }
-        let share =
-            if at_end { effective_share(&surfels, &terms) } else { params.information_share };
-        Measured { surfels: count, terms, redundant, scale, between, within, share }
+        let mut found = Measured {
+            surfels: count,
+            terms,
+            redundant,
+            scale,
+            between,
+            within,
+            share: params.information_share,
+            correlation: Correlation::NONE,
+        };
+        if at_end {
+            let residuals: Vec<Residuals> =
+                found.terms.iter().map(|t| found.residuals(t)).collect();
+            found.correlation = Correlation::learn(&residuals, at.edge);
+            found.share = 1.0;
+        }
+        found
     }
 
-    fn information(&self, term: &Term) -> f64 {
-        self.share / (self.between + self.within / term.weight)
+    /// The inverse of a measurement's standard deviation, 1 / metres.
+    fn precision(&self, term: &Term) -> f64 {
+        (self.share / (self.between + self.within / term.weight)).sqrt()
     }
 
-    /// Hessian and gradient of (1), halved.
-    fn system(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let size = 6 * self.terms.len();
-        let (mut hessian, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        let mut of_surfel: Vec<Vec<(usize, Twist, f64, f64)>> = vec![Vec::new(); self.surfels];
-        for (k, terms) in self.terms.iter().enumerate() {
-            let (mut block, mut rows) = (Mat6::zeros(), Twist::zeros());
-            for term in terms {
-                let information = self.information(term);
-                let seen = (k, term.jacobian, information, term.residual);
-                of_surfel[term.surfel as usize].push(seen);
-                block += term.jacobian * term.jacobian.transpose() * information;
-                rows += term.jacobian * (term.residual * information);
-            }
-            hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(&block);
-            gradient.fixed_rows_mut::<6>(6 * k).copy_from(&rows);
+    fn residuals(&self, terms: &[Term]) -> Residuals {
+        let ray = terms.iter().map(|t| t.at).sum::<Vec3>().try_normalize(0.0);
+        let ray = ray.unwrap_or_else(Vec3::z);
+        Residuals {
+            at: terms.iter().map(|t| t.at - ray * ray.dot(&t.at)).collect(),
+            value: terms.iter().map(|t| t.residual * self.precision(t)).collect(),
         }
-        for seen in &of_surfel {
-            let total: f64 = seen.iter().map(|s| s.2).sum();
-            let mean = seen.iter().map(|s| s.2 * s.3).sum::<f64>() / total;
-            for (a, ja, wa, _) in seen {
-                let mut rows = gradient.fixed_rows_mut::<6>(6 * a);
-                rows -= ja * (wa * mean);
-                for (b, jb, wb, _) in seen {
-                    let mut block = hessian.fixed_view_mut::<6, 6>(6 * a, 6 * b);
-                    block -= ja * jb.transpose() * (wa * wb / total);
-                }
+    }
+
+    /// Hessian and gradient by the poses of the geometry's half squared error.
+    fn system(&self) -> Result<(DMatrix<f64>, DVector<f64>)> {
+        let rows: Vec<Vec<Row>> = self.terms.par_iter().map(|terms| self.rows(terms)).collect();
+        reduced(&rows, self.surfels)
+    }
+
+    /// The equations of one scan, their noise white.
+    fn rows(&self, terms: &[Term]) -> Vec<Row> {
+        let at = self.residuals(terms).at;
+        let equation = |white: WhiteRow| {
+            let mut row = Row { jacobian: Twist::zeros(), residual: 0.0, heights: Vec::new() };
+            for (index, coefficient) in white.terms {
+                let term = &terms[index];
+                let factor = coefficient * self.precision(term);
+                row.jacobian += term.jacobian * factor;
+                row.residual += term.residual * factor;
+                row.heights.push((term.surfel, factor));
             }
-        }
-        (hessian, gradient)
+            row
+        };
+        whiten(&at, &self.correlation).into_iter().map(equation).collect()
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod align;
 mod correlation;
+mod equations;
 mod factors;
 mod joint;
 mod pair;
@@ -18,6 +19,7 @@ mod sigma;
 mod stages;
 mod surfels;
 mod verdict;
+mod whiten;
 
 pub use pair::{PairScan, align_pair};
 pub use prepare::PreparedScan;
@@ -59,14 +61,14 @@ crate::params! {
         /// Times that a scan put aside is tried at most.
         max_rounds: usize = 5, in [1, 100];
         /// What a correspondence counts for beside the prior while the scans are being brought together; below 1 because
-        /// neighbours share their noise. At the end it is estimated from the residuals.
+        /// neighbours share their noise. At the end what they share is estimated from the residuals and taken out.
         information_share: f64 = 0.05, in [0.0001, 1.0];
         /// Corrections beyond this many standard deviations of the prior are deferred, then refused.
         max_correction: f64 = 3.0, in [0.5, 100.0];
         /// Whether all accepted scans are optimised together at the end.
         joint: bool = true;
         /// Passes of the joint optimisation at most, each with new correspondences.
-        joint_iterations: usize = 20, in [1, 1000];
+        joint_iterations: usize = 12, in [1, 1000];
     }
 }
 

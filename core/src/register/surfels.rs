@@ -32,6 +32,8 @@ pub(crate) struct Term {
     pub jacobian: Twist,
     /// Mean square about the mean, square metres.
     pub variance: f64,
+    /// Mean place of the points on the surface, sensor frame, metres.
+    pub at: Vec3,
 }
 
 /// A measured point with its normal and ray, object frame.
@@ -48,6 +50,7 @@ struct OnSurfel {
     weight: f64,
     residual: f64,
     jacobian: Twist,
+    at: Vec3,
 }
 
 /// Points of a scan that are looked at: more tell nothing new, because neighbours share their noise.
@@ -167,7 +170,7 @@ impl Surfels {
                     pose.rotation.inverse_transform_vector(&(foot - pose.translation.vector));
                 let (center, normal) = (&self.centers[index], &self.normals[index]);
                 let (_, jacobian) = point_to_plane(pose, &seen, center, normal);
-                found.push(OnSurfel { surfel: index as u32, weight, residual, jacobian });
+                found.push(OnSurfel { surfel: index as u32, weight, residual, jacobian, at: seen });
             }
         }
         found.sort_by_key(|on| on.surfel);
@@ -177,12 +180,14 @@ impl Surfels {
 
 /// The mean of one scan's measurements of one surfel.
 fn mean(found: &[OnSurfel]) -> Option<Term> {
-    let (mut weight, mut residual, mut square, mut jacobian) = (0.0, 0.0, 0.0, Twist::zeros());
+    let (mut weight, mut residual, mut square) = (0.0, 0.0, 0.0);
+    let (mut jacobian, mut at) = (Twist::zeros(), Vec3::zeros());
     for on in found {
         weight += on.weight;
         residual += on.weight * on.residual;
         square += on.weight * on.residual * on.residual;
         jacobian += on.jacobian * on.weight;
+        at += on.at * on.weight;
     }
     residual /= weight;
     (weight >= LEAST_WEIGHT).then_some(Term {
@@ -191,6 +196,7 @@ fn mean(found: &[OnSurfel]) -> Option<Term> {
         residual,
         jacobian: jacobian / weight,
         variance: (square / weight - residual * residual).max(0.0),
+        at: at / weight,
     })
 }
 
