@@ -30,6 +30,22 @@ pub fn tukey(r: f64) -> f64 {
     if u.abs() >= 1.0 { 0.0 } else { (1.0 - u * u).powi(2) }
 }
 
+/// The variance of a point along its surface's normal beside that within the surface (Segal, Haehnel & Thrun 2009, §III.B).
+const FLATNESS: f64 = 1e-3;
+
+/// Information of the difference of two points, each of which lies on its surface and somewhere on it: the inverse of
+/// `C_b + R C_a R'` (Segal, Haehnel & Thrun 2009, Generalized-ICP, eq. 2).
+///
+/// `a` and `b` are the unit normals of the two in one frame. Two parallel planes have information 1 along their normal and
+/// 1e-3 within. It belongs to the rotation at which the normals were taken, and is held while a step is computed.
+pub fn combined_information(a: &Vec3, b: &Vec3) -> Mat3 {
+    // Half of the variance along the normal is each point's; C = (1 / eps) I + (1 - 1 / eps) n n'.
+    let inside = 0.5 / FLATNESS;
+    let flat = Mat3::from_diagonal_element(2.0 * inside);
+    let covariance = flat + (a * a.transpose() + b * b.transpose()) * (0.5 - inside);
+    covariance.try_inverse().unwrap_or_else(Mat3::zeros)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,9 +83,36 @@ mod tests {
     }
 
     #[test]
+    fn the_gradient_of_plane_to_plane_agrees_with_finite_differences() {
+        let (ti, p, m, n) = example();
+        let information = combined_information(&Vec3::new(0.6, 0.0, 0.8), &n);
+        let cost = |pose: &Pose| {
+            let (r, _) = point_to_point(pose, &p, &m);
+            0.5 * r.dot(&(information * r))
+        };
+        let (r, jacobian) = point_to_point(&ti, &p, &m);
+        let gradient = jacobian.transpose() * information * r;
+        for k in 0..6 {
+            let slope = (cost(&(ti * exp(&axis(k)))) - cost(&(ti * exp(&-axis(k))))) / (2.0 * STEP);
+            assert!((slope - gradient[k]).abs() < 1e-8 * gradient.norm().max(1.0), "{k}: {slope}");
+        }
+    }
+
+    #[test]
     fn tukey_forgets_outliers() {
         assert_eq!(tukey(0.0), 1.0);
         assert!(tukey(1.0) > 0.9);
         assert_eq!(tukey(5.0), 0.0);
+    }
+
+    #[test]
+    fn planes_slide_along_each_other_and_keep_their_distance() {
+        let information = combined_information(&Vec3::z(), &Vec3::z());
+        let expected = Mat3::from_diagonal(&Vec3::new(FLATNESS, FLATNESS, 1.0));
+        assert!((information - expected).norm() < 1e-9, "{information}");
+        // Planes at right angles hold each other along both normals, each with the variance within the other.
+        let crossed = combined_information(&Vec3::x(), &Vec3::z());
+        assert!((crossed[(0, 0)] - 2.0 * FLATNESS).abs() < 1e-5 && crossed[(0, 2)].abs() < 1e-9);
+        assert!((crossed[(1, 1)] - FLATNESS).abs() < 1e-9);
     }
 }

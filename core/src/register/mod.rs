@@ -18,12 +18,15 @@ mod sample;
 mod sigma;
 mod stages;
 mod surfels;
+mod variants;
 mod verdict;
 mod whiten;
 
+pub use align::{Kernel, Matching, Rejection, Selection, Weight};
 pub use pair::{PairScan, align_pair};
 pub use prepare::PreparedScan;
 pub use registrar::Registrar;
+pub use variants::{Variant, variants};
 pub use verdict::{Status, Verdict};
 
 use crate::geometry::Pose;
@@ -34,8 +37,14 @@ use sample::Sample;
 crate::choice! {
     /// How scans are aligned.
     pub enum Method {
-        /// Point-to-plane, robust, with the robot's pose as prior.
+        /// The distance along the normal halfway between the two points' (Chen & Medioni 1992; Rusinkiewicz 2019), with
+        /// the robot's pose as prior.
         PointToPlane = "point_to_plane",
+        /// The distance between the two points (Besl & McKay 1992), with the robot's pose as prior.
+        PointToPoint = "point_to_point",
+        /// Generalized ICP (Segal, Haehnel & Thrun 2009): both points are uncertain within their planes; with the robot's
+        /// pose as prior.
+        PlaneToPlane = "plane_to_plane",
         /// The thesis's: point-to-point within a fixed radius, normals compared, no prior.
         Thesis = "thesis",
     }
@@ -44,8 +53,22 @@ crate::choice! {
 crate::params! {
     /// Parameters of the registration.
     pub struct RegisterParams("register") {
-        /// How scans are aligned.
+        /// How scans are aligned; `thesis` has its own choices for the stages of ICP that follow.
         method: Method = Method::PointToPlane;
+        /// Stage 1 of ICP: which points of a scan are aligned.
+        selection: Selection = Selection::Uniform;
+        /// Stage 2: which point of the map a point of the scan should lie on.
+        matching: Matching = Matching::Closest;
+        /// Stage 3: what a pair of points counts for.
+        weight: Weight = Weight::Constant;
+        /// Robust kernel: what large residuals count for beside small ones.
+        kernel: Kernel = Kernel::Tukey;
+        /// Stage 4: which pairs within the search radius are rejected.
+        rejection: Rejection = Rejection::Normals;
+        /// Share of the pairs that `rejection: trimmed` rejects.
+        trim: f64 = 0.1, in [0.0, 0.9];
+        /// Seed of the selections that draw by chance.
+        seed: usize = 1, in [0, 1000000];
         /// Search radius for correspondences at the start; 0 takes it from the pose's standard deviation.
         radius: f64 = 0.0, in [0.0, 1.0], unit "m";
         /// Pairs whose normals differ by more are rejected.
@@ -97,7 +120,7 @@ impl Registration {
         let mut registration =
             Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN };
         let samples: Vec<Sample> =
-            scans.iter().map(|s| Sample::new(s, RegisterParams::default().samples)).collect();
+            scans.iter().map(|s| Sample::new(s, &RegisterParams::default())).collect();
         registration.residual =
             joint::residual(&samples, &registration, &RegisterParams::default());
         registration
@@ -117,7 +140,7 @@ pub fn register(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let samples: Vec<Sample> = scans.iter().map(|s| Sample::new(s, params.samples)).collect();
+    let samples: Vec<Sample> = scans.iter().map(|s| Sample::new(s, params)).collect();
     register_samples(&samples, robot, pose_sigma, params, progress)
 }
 

@@ -15,7 +15,7 @@ pub struct PairScan {
 impl PairScan {
     /// Makes a scan ready.
     pub fn new(scan: &PreparedScan, params: &RegisterParams) -> PairScan {
-        let sample = Sample::new(scan, params.samples);
+        let sample = Sample::new(scan, params);
         let mut map = Map::new(sample.target_spacing);
         sample.add_to(&mut map, &Pose::identity());
         PairScan { sample, map }

@@ -58,7 +58,7 @@ impl Registrar {
     /// Takes a scan with the robot's pose `object_from_sensor`. Returns the scans whose pose or verdict is new, this
     /// one first; others had been put aside and were placed now.
     pub fn add(&mut self, scan: &PreparedScan, robot: &Pose) -> Vec<usize> {
-        let sample = Sample::new(scan, self.params.samples);
+        let sample = Sample::new(scan, &self.params);
         let index = self.samples.len();
         self.robot.push(*robot);
         self.poses.push(*robot);

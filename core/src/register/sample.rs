@@ -1,7 +1,7 @@
 //! One scan made ready for registration.
 
-use super::PreparedScan;
-use super::align::Map;
+use super::align::{Map, Rejection, Surface, boundary, select};
+use super::{PreparedScan, RegisterParams};
 use crate::geometry::{Aabb, Pose, Vec3, median};
 
 /// One scan made ready for registration, sensor frame.
@@ -9,11 +9,15 @@ pub(crate) struct Sample {
     /// The points that are aligned.
     pub points: Vec<Vec3>,
     pub normals: Vec<Vec3>,
+    /// Unit vectors along their rays, away from the sensor.
+    pub rays: Vec<Vec3>,
     /// Denser points: the map is made of them.
     pub targets: Vec<Vec3>,
     pub target_normals: Vec<Vec3>,
     /// Unit vectors along their rays, away from the sensor.
     pub target_rays: Vec<Vec3>,
+    /// Whether each target lies at the scan's border; empty where no one asks.
+    pub target_boundary: Vec<bool>,
     /// Distance between the targets, metres.
     pub target_spacing: f64,
     pub noise: f64,
@@ -24,20 +28,29 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    pub(crate) fn new(scan: &PreparedScan, count: usize) -> Sample {
-        let kept = scan.sample(count);
+    pub(crate) fn new(scan: &PreparedScan, params: &RegisterParams) -> Sample {
+        let kept = select(scan, params);
         let points: Vec<Vec3> = kept.iter().map(|&i| scan.points[i]).collect();
         let dense = scan.sample(TARGETS);
         let targets: Vec<Vec3> = dense.iter().map(|&i| scan.points[i]).collect();
+        let target_normals: Vec<Vec3> = dense.iter().map(|&i| scan.normals[i]).collect();
+        let target_spacing =
+            scan.spacing * (scan.points.len() as f64 / targets.len().max(1) as f64).sqrt();
+        let target_boundary = if params.stages().rejection == Rejection::Boundary {
+            boundary(&targets, &target_normals, target_spacing)
+        } else {
+            Vec::new()
+        };
         Sample {
+            rays: kept.iter().map(|&i| scan.rays[i]).collect(),
             normals: kept.iter().map(|&i| scan.normals[i]).collect(),
             noise: scan.noise.max(1e-6),
-            target_spacing: scan.spacing
-                * (scan.points.len() as f64 / targets.len().max(1) as f64).sqrt(),
+            target_spacing,
+            target_boundary,
             distance: median(points.iter().map(Vec3::norm).collect()).unwrap_or(0.0),
             extent: Aabb::of(&targets).diagonal(),
             target_rays: dense.iter().map(|&i| scan.rays[i]).collect(),
-            target_normals: dense.iter().map(|&i| scan.normals[i]).collect(),
+            target_normals,
             targets,
             points,
         }
@@ -45,7 +58,12 @@ impl Sample {
 
     /// Adds the targets, seen from `pose`, to the map.
     pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
-        map.insert(&self.targets, &self.target_normals, pose);
+        let surface = Surface {
+            points: &self.targets,
+            normals: &self.target_normals,
+            boundary: &self.target_boundary,
+        };
+        map.insert(&surface, pose);
     }
 
     /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).

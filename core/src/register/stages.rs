@@ -21,7 +21,8 @@ impl Sample {
         let reach = self.pose_reach(sigma).max(self.target_spacing);
         let points: Vec<_> = self.points.iter().copied().step_by(OVERLAP_STRIDE).collect();
         let normals: Vec<_> = self.normals.iter().copied().step_by(OVERLAP_STRIDE).collect();
-        let moving = Moving { points: &points, normals: &normals, noise: self.noise };
+        let rays: Vec<_> = self.rays.iter().copied().step_by(OVERLAP_STRIDE).collect();
+        let moving = Moving { points: &points, normals: &normals, rays: &rays, noise: self.noise };
         correspondences(&moving, map, robot, reach, params).len()
     }
 }
@@ -110,7 +111,8 @@ pub(crate) fn place(
     // The map stands where its first scan was believed to be: its error and the scan's add up.
     let information = sigma.information() / 2.0;
     let prior = Prior { pose: *robot, information };
-    let moving = Moving { points: &sample.points, normals: &sample.normals, noise };
+    let moving =
+        Moving { points: &sample.points, normals: &sample.normals, rays: &sample.rays, noise };
     let radius = radius(sample, sigma, noise, params);
     let alignment = align(&moving, map, &prior, radius, params);
     let verdict = Verdict::of(&alignment, robot, &information, sample.points.len(), noise, params);

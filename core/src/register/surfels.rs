@@ -216,7 +216,7 @@ fn patch(points: &[Vec3], normals: &[Vec3], members: &[u32]) -> Option<(Vec3, Ve
 mod tests {
     use super::*;
     use crate::geometry::Scan;
-    use crate::register::PreparedScan;
+    use crate::register::{PreparedScan, RegisterParams};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn noise_along_the_rays_does_not_push_the_outline_inwards() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let sample = Sample::new(&ball(&mut rng), 2000);
+        let sample = Sample::new(&ball(&mut rng), &RegisterParams::default());
         // The true surface as surfels.
         let center = Vec3::z() * 0.5;
         let normals: Vec<Vec3> = (0..600)

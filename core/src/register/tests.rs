@@ -36,13 +36,30 @@ fn random_twist(rng: &mut ChaCha8Rng, translation: f64, rotation: f64) -> Twist 
     Twist::from_fn(|i, _| rng.random_range(-1.7..1.7) * if i < 3 { translation } else { rotation })
 }
 
-struct Case {
-    scans: Vec<PreparedScan>,
-    robot: Vec<Pose>,
-    truth: Vec<Pose>,
+pub(super) struct Case {
+    pub scans: Vec<PreparedScan>,
+    pub robot: Vec<Pose>,
+    pub truth: Vec<Pose>,
 }
 
-fn case(sigma: PoseSigma) -> Case {
+/// Root mean square distance along the normals between where `fixed_from_moving` and the truth put the points of scan
+/// `moving`, metres.
+pub(super) fn pair_error(
+    case: &Case,
+    moving: usize,
+    fixed: usize,
+    fixed_from_moving: &Pose,
+) -> f64 {
+    let truth = case.truth[fixed].inverse() * case.truth[moving];
+    let off = truth.inverse() * fixed_from_moving;
+    let scan = &case.scans[moving];
+    let square =
+        |(p, n): (&Vec3, &Vec3)| n.dot(&(off.transform_point(&(*p).into()).coords - p)).powi(2);
+    let sum: f64 = scan.points.iter().zip(&scan.normals).map(square).sum();
+    (sum / scan.points.len() as f64).sqrt()
+}
+
+pub(super) fn case(sigma: PoseSigma) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let truth = truth();
     let scans = truth
@@ -67,7 +84,7 @@ fn error(poses: &[Pose], truth: &[Pose]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-const SIGMA: PoseSigma = PoseSigma { translation: 0.002, rotation: 0.006 };
+pub(super) const SIGMA: PoseSigma = PoseSigma { translation: 0.002, rotation: 0.006 };
 
 #[test]
 fn poses_come_back_and_every_scan_is_accepted() {

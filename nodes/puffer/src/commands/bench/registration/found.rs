@@ -4,7 +4,7 @@ use anyhow::{Context, Result, anyhow};
 use puffer_core::Progress;
 use puffer_core::geometry::{Pose, pose_from_rows};
 use puffer_core::register::{PairScan, PreparedScan, RegisterParams, Status, align_pair, register};
-use puffer_core::simulate::SimulatedScans;
+use puffer_core::simulate::{SimulatedScans, SimulatedView};
 use serde::Deserialize;
 use std::path::Path;
 use std::time::Instant;
@@ -30,6 +30,23 @@ pub(super) struct Pair {
     pub accepted: bool,
 }
 
+/// The scans made ready for registration, and the seconds that it took.
+pub(super) struct Prepared {
+    pub scans: Vec<PreparedScan>,
+    seconds: f64,
+}
+
+impl Prepared {
+    pub(super) fn new(scans: &SimulatedScans) -> Result<Prepared> {
+        let started = Instant::now();
+        let view = |(i, v): (usize, &SimulatedView)| {
+            PreparedScan::new(&v.scan).with_context(|| format!("view {i}"))
+        };
+        let scans = scans.views.iter().enumerate().map(view).collect::<Result<_>>()?;
+        Ok(Prepared { scans, seconds: started.elapsed().as_secs_f64() })
+    }
+}
+
 #[derive(Deserialize)]
 struct Foreign {
     views: Vec<ForeignView>,
@@ -53,24 +70,21 @@ struct ForeignPair {
 
 impl Found {
     /// What we make of the scans.
-    pub(super) fn ours(scans: &SimulatedScans, params: &RegisterParams) -> Result<Found> {
-        let started = Instant::now();
-        let prepared: Vec<PreparedScan> = scans
-            .views
-            .iter()
-            .enumerate()
-            .map(|(i, v)| PreparedScan::new(&v.scan).with_context(|| format!("view {i}")))
-            .collect::<Result<_>>()?;
-        let prepare = started.elapsed().as_secs_f64();
+    pub(super) fn ours(
+        scans: &SimulatedScans,
+        prepared: &Prepared,
+        params: &RegisterParams,
+    ) -> Result<Found> {
         let started = Instant::now();
         let sigma = Some(scans.pose_sigma);
-        let found = register(&prepared, &reported(scans), sigma, params, &Progress::silent())?;
+        let found =
+            register(&prepared.scans, &reported(scans), sigma, params, &Progress::silent())?;
         Ok(Found {
             refused: Some(found.verdicts.iter().filter(|v| v.status != Status::Accepted).count()),
             poses: found.poses,
-            prepare: Some(prepare),
+            prepare: Some(prepared.seconds),
             register: started.elapsed().as_secs_f64(),
-            pairs: pairs(scans, &prepared, params)?,
+            pairs: pairs(scans, &prepared.scans, params)?,
         })
     }
 

@@ -1,6 +1,7 @@
 //! `puffer bench registration`: how far registered poses are from the truth, on simulated scans.
 
 mod found;
+mod growth;
 mod row;
 
 use crate::commands::simulate::{truth_of, write_folder};
@@ -9,14 +10,14 @@ use crate::parameters::ParameterArgs;
 use crate::table::print_text;
 use anyhow::{Context, Result};
 use clap::Args;
-use found::Found;
+use found::{Found, Prepared};
 use puffer_core::Progress;
 use puffer_core::mesh::Mesh;
 use puffer_core::params::ParamValue;
-use puffer_core::register::RegisterParams;
+use puffer_core::register::{RegisterParams, Variant, variants};
 use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, simulate};
-use row::{heading, measure, worst};
-use serde_json::Value;
+use row::{heading, measure, variants_heading, worst};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Registers simulated scans and measures the poses against the true ones, over several seeds.
@@ -40,6 +41,12 @@ pub struct Registration {
     /// Measures the poses in CASE.NAME.json beside the folders kept, instead of registering: another program's
     #[arg(long, value_name = "NAME", requires = "keep")]
     judge: Option<String>,
+    /// Compares the variants of ICP: one row each for what the parameters say, and for every other word of each choice
+    #[arg(long, conflicts_with_all = ["keep", "one_by_one"])]
+    variants: bool,
+    /// Measures how long scans take that come one by one, the more of them there are; try it with --views 100
+    #[arg(long, conflicts_with = "keep")]
+    one_by_one: bool,
     #[command(flatten)]
     parameters: ParameterArgs,
     /// Print a JSON object a case instead of a table
@@ -48,6 +55,7 @@ pub struct Registration {
 }
 
 /// What is registered.
+#[derive(Clone)]
 struct Case {
     object: String,
     family: NoiseFamily,
@@ -65,7 +73,8 @@ impl Registration {
         let params = self.parameters.load()?.register;
         let families: Vec<NoiseFamily> =
             self.noise.iter().map(|word| family(word)).collect::<Result<_>>()?;
-        if !self.json {
+        let several = self.variants || self.one_by_one;
+        if !self.json && !several {
             print_text(&heading());
         }
         for object in &self.objects {
@@ -77,6 +86,10 @@ impl Registration {
                     let of = SimulateParams { family, views: self.views, ..Default::default() };
                     let scans = simulate(&truth, &of, seed, &Progress::silent())?;
                     let case = Case { object: name.to_string(), family, seed };
+                    if several {
+                        self.compare(&case, &truth, &scans, &params)?;
+                        continue;
+                    }
                     let found = self.register(&case, &truth, &scans, &params)?;
                     let row = measure(case, &truth, &scans, found)?;
                     print_text(&if self.json { format!("{}\n", row.json()) } else { row.line() });
@@ -85,6 +98,42 @@ impl Registration {
                 if !self.json && rows.len() > 1 {
                     print_text(&worst(&rows));
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// One table about one case.
+    fn compare(
+        &self,
+        case: &Case,
+        truth: &Mesh,
+        scans: &SimulatedScans,
+        params: &RegisterParams,
+    ) -> Result<()> {
+        let prepared = Prepared::new(scans).with_context(|| case.name())?;
+        if self.one_by_one {
+            let growth = growth::measure(scans, &prepared, params);
+            print_text(&if self.json {
+                format!("{}\n", growth.json(case))
+            } else {
+                growth.table(case)
+            });
+            return Ok(());
+        }
+        if !self.json {
+            print_text(&variants_heading(case));
+        }
+        let default = Variant { name: "default".to_owned(), params: params.clone() };
+        for Variant { name, params } in std::iter::once(default).chain(variants(params)) {
+            let found = Found::ours(scans, &prepared, &params).with_context(|| name.clone())?;
+            let row = measure(case.clone(), truth, scans, found)?;
+            if self.json {
+                let mut value = row.json();
+                value["variant"] = json!(name);
+                print_text(&format!("{value}\n"));
+            } else {
+                print_text(&row.variant_line(&name));
             }
         }
         Ok(())
@@ -103,7 +152,8 @@ impl Registration {
         if let Some(folder) = &self.keep {
             write_folder(&folder.join(case.name()), truth, scans)?;
         }
-        Found::ours(scans, params).with_context(|| case.name())
+        let prepared = Prepared::new(scans).with_context(|| case.name())?;
+        Found::ours(scans, &prepared, params).with_context(|| case.name())
     }
 }
 

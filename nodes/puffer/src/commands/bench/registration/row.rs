@@ -67,6 +67,24 @@ pub(super) fn heading() -> String {
     "errors in mm: along the normal, full, of the surface; in brackets the robot's own\n".to_owned()
 }
 
+/// The heading of a table of variants of `case`.
+pub(super) fn variants_heading(case: &Case) -> String {
+    format!(
+        "{}: errors of all scans in mm, time in s; pairs: median error in mm, share beyond {FAILED} mm in %, time in ms\n  \
+         {:<24} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8} {:>7} {:>7}\n",
+        case.name(),
+        "",
+        "normal",
+        "full",
+        "surface",
+        "refused",
+        "s",
+        "pairs",
+        "%",
+        "ms"
+    )
+}
+
 fn figures(found: &PoseErrors, robot: &PoseErrors) -> String {
     format!(
         "normal {:6.3} ({:5.2})  full {:6.3} ({:5.2})  surface {:6.3} ({:5.2})",
@@ -131,6 +149,23 @@ impl Row {
     fn false_successes(&self) -> usize {
         let failed = |(pair, error): &(&Pair, &f64)| pair.accepted && **error > FAILED;
         self.found.pairs.iter().zip(&self.pair_errors).filter(failed).count()
+    }
+
+    /// The row of a table of variants of this case.
+    pub(super) fn variant_line(&self, variant: &str) -> String {
+        let times: Vec<f64> = self.found.pairs.iter().map(|p| p.milliseconds).collect();
+        let failed = self.pair_errors.iter().filter(|error| **error > FAILED).count();
+        format!(
+            "  {variant:<24} {:>8.3} {:>8.3} {:>8.3} {:>8} {:>7.1} {:>8.3} {:>7.1} {:>7.1}\n",
+            self.errors.normal,
+            self.errors.full,
+            self.errors.surface,
+            self.found.refused.map_or_else(|| "-".to_owned(), |count| count.to_string()),
+            self.found.register,
+            quantile(&self.pair_errors, 0.5),
+            100.0 * failed as f64 / self.pair_errors.len().max(1) as f64,
+            quantile(&times, 0.5)
+        )
     }
 
     pub(super) fn json(&self) -> Value {
