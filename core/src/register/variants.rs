@@ -18,7 +18,7 @@ pub fn variants(params: &RegisterParams) -> Vec<Variant> {
     let mut found = Vec::new();
     let values = params.values();
     for (spec, (field, chosen)) in RegisterParams::specs().iter().zip(values) {
-        for word in spec.choices.iter().filter(|word| chosen != Value::from(**word)) {
+        for word in spec.choices.iter().filter(|word| chosen != **word) {
             let mut params = params.clone();
             // A word from the list is always taken.
             if params.set(field, &Value::from(*word)).is_ok() {
