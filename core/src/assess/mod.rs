@@ -7,6 +7,9 @@
 mod align;
 mod calibration;
 mod distances;
+#[cfg(test)]
+mod filter_tests;
+mod filtering;
 mod poses;
 mod reference;
 mod sample;
@@ -18,6 +21,7 @@ mod topology;
 pub use align::{Alignment, align};
 pub use calibration::{Calibration, calibration};
 pub use distances::{Distances, RawDistances, Spread};
+pub use filtering::{FilterFigures, filter_figures};
 pub use poses::{PoseErrors, PosedHits, pair_error, pose_errors};
 pub use reference::{Nearest, Reference, distance_to_open_truth};
 pub use sample::{Sample, sample_surface};

@@ -3,6 +3,9 @@
 use crate::geometry::{Pose, Vec3};
 use crate::register::PreparedScan;
 
+/// No sensor is better, metres.
+pub(super) const LEAST_SIGMA: f32 = 1e-6;
+
 /// Measurements of all scans, object frame.
 pub(super) struct Merged {
     pub points: Vec<Vec3>,
@@ -12,8 +15,10 @@ pub(super) struct Merged {
     pub rays: Vec<Vec3>,
     /// The scan of each measurement.
     pub scan: Vec<u16>,
-    /// Standard deviation within its scan, metres.
-    pub noise: Vec<f32>,
+    /// Standard deviation along the normal, within its scan, metres.
+    pub sigma: Vec<f32>,
+    /// Distance of the sensor, metres.
+    pub range: Vec<f32>,
 }
 
 impl Merged {
@@ -24,7 +29,8 @@ impl Merged {
             normals: Vec::with_capacity(total),
             rays: Vec::with_capacity(total),
             scan: Vec::with_capacity(total),
-            noise: Vec::with_capacity(total),
+            sigma: Vec::with_capacity(total),
+            range: Vec::with_capacity(total),
         };
         for (index, (scan, pose)) in scans.iter().enumerate() {
             let count = scan.points.len();
@@ -34,7 +40,8 @@ impl Merged {
             merged.normals.extend(scan.normals.iter().map(|n| pose.rotation * n));
             merged.rays.extend(scan.rays.iter().map(|r| pose.rotation * r));
             merged.scan.extend(std::iter::repeat_n(index as u16, count));
-            merged.noise.extend(std::iter::repeat_n(scan.noise.max(1e-6) as f32, count));
+            merged.range.extend_from_slice(&scan.range);
+            merged.sigma.extend(scan.sigma.iter().map(|s| s.max(LEAST_SIGMA)));
         }
         merged
     }

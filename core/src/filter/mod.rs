@@ -5,14 +5,18 @@
 //! robustly to all scans' measurements (`weighted`); the thesis's averages in a slim neighbourhood along
 //! the normal (`thesis`).
 
+mod fitter;
+mod learnt;
 mod merged;
 mod quadric;
+mod refused;
 mod thesis;
 mod weighted;
 
-use crate::geometry::{Cloud, Pose};
+use crate::geometry::{Cloud, Components, Pose};
 use crate::register::PreparedScan;
 use crate::{Error, Progress, Result};
+use learnt::Learnt;
 use merged::Merged;
 
 crate::choice! {
@@ -52,6 +56,11 @@ pub struct Filtered {
     pub reduction_radius: f64,
     /// Number of measurements that went in.
     pub measurements: usize,
+    /// For each scan, ascending, the points of the raw scan ([`PreparedScan::source`]) that no point of the cloud
+    /// explains: those farther from it than four standard deviations.
+    pub refused: Vec<Vec<u32>>,
+    /// What the noise is made of, in units of the variances that the scans state.
+    pub noise: Components,
 }
 
 /// Combines registered scans, each with its pose `object_from_sensor`.
@@ -67,15 +76,15 @@ pub fn filter(
     progress: &Progress,
 ) -> Result<Filtered> {
     progress.report("filter", 0.0)?;
-    let merged = Merged::new(scans);
+    let mut merged = Merged::new(scans);
     let (noise_radius, reduction_radius) = radii(scans, residual, params);
+    let noise = Learnt::new(&mut merged, noise_radius, reduction_radius, params);
+    let (of_noise, of_reduction) = (noise_radius, reduction_radius);
     let cloud = match params.method {
         Method::Weighted => {
-            weighted::filter(&merged, noise_radius, reduction_radius, params, progress)?
+            weighted::filter(&merged, of_noise, of_reduction, params, &noise, progress)?
         }
-        Method::Thesis => {
-            thesis::filter(&merged, noise_radius, reduction_radius, params, progress)?
-        }
+        Method::Thesis => thesis::filter(&merged, of_noise, of_reduction, params, progress)?,
     };
     if cloud.is_empty() {
         return Err(Error::input(format!(
@@ -88,7 +97,16 @@ pub fn filter(
     }
     progress.report("filter", 1.0)?;
     let cloud = cloud.to_single_precision();
-    Ok(Filtered { cloud, noise_radius, reduction_radius, measurements: merged.points.len() })
+    let refused = refused::refused(scans, &merged, &cloud, noise_radius, &noise);
+    let measurements = merged.points.len();
+    Ok(Filtered {
+        cloud,
+        noise_radius,
+        reduction_radius,
+        measurements,
+        refused,
+        noise: noise.components,
+    })
 }
 
 /// Radii from the data: wide enough for a dozen measurements of one scan, and for the noise (with the error
@@ -98,7 +116,7 @@ fn radii(scans: &[(&PreparedScan, Pose)], residual: f64, params: &FilterParams) 
         crate::geometry::median(scans.iter().map(|(scan, _)| f(scan)).collect()).unwrap_or(1e-3)
     };
     let noise = typical(|s| s.noise).max(if residual.is_finite() { residual } else { 0.0 });
-    let automatic = (2.5 * typical(|s| s.spacing)).max(4.0 * noise);
+    let automatic = (2.5 * typical(|s| s.spacing)).max(fitter::LEAST_RADIUS * noise);
     let noise_radius = if params.noise_radius > 0.0 { params.noise_radius } else { automatic };
     let reduction =
         if params.reduction_radius > 0.0 { params.reduction_radius } else { noise_radius / 2.5 };

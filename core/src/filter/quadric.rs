@@ -1,16 +1,16 @@
 //! A height field fitted robustly over a tangent plane (Levin 2003, Mesh-independent surface interpolation;
 //! weights as in iteratively reweighted least squares).
 
-use crate::geometry::{Vec3, any_orthogonal};
-use nalgebra::{SMatrix, SVector};
+use crate::geometry::{Components, Moments, Vec3, any_orthogonal};
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 /// One measurement seen by the fit.
 #[derive(Clone, Copy)]
 pub(super) struct Measured {
     pub point: Vec3,
     pub scan: u16,
-    /// Weight by noise and incidence, before distance and robustness.
-    pub weight: f64,
+    /// Standard deviation along the normal that its scan states, metres.
+    pub sigma: f64,
 }
 
 /// The height field `h = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` at its foot point.
@@ -25,73 +25,106 @@ pub(super) struct Fit {
     pub effective: f64,
     /// Scans among them.
     pub support: u16,
+    /// Residuals of the scans, in stated standard deviations.
+    pub moments: Moments,
 }
 
 const TERMS: usize = 6;
 /// Reweighting passes; the weights change by less than a per cent after four.
 const PASSES: usize = 4;
+/// Tukey's constant: 95 % efficient for normal noise.
+const TUKEY: f64 = 4.685;
+/// Variance of normal numbers under those weights: `E[w x^2] / E[w]`.
+const TUKEY_VARIANCE: f64 = 0.829;
 
-/// Fits the surface near `seed` with start normal `normal` from measurements within `radius`; `floor` is the
-/// smallest standard deviation believed of a measurement (metres). `None` if too few agree.
+type Terms = SVector<f64, TERMS>;
+
+/// A measurement over the tangent plane, lengths in radii.
+struct Local {
+    terms: Terms,
+    height: f64,
+    sigma: f64,
+    scan: usize,
+    /// By distance from the seed.
+    near: f64,
+    robust: f64,
+}
+
+/// Fits the surface near `seed` with start normal `normal` from measurements within `radius`, whose noise is made of
+/// `noise`. `None` if too few agree.
 pub(super) fn fit(
     measured: &[Measured],
     seed: &Vec3,
     normal: &Vec3,
     radius: f64,
-    floor: f64,
+    noise: &Components,
 ) -> Option<Fit> {
     let (u, v) = (any_orthogonal(normal), normal.cross(&any_orthogonal(normal)));
+    let mut scans: Vec<u16> = measured.iter().map(|m| m.scan).collect();
+    scans.sort_unstable();
+    scans.dedup();
     // Scaled to the radius, so that the normal equations stay well conditioned.
-    let local: Vec<(SVector<f64, TERMS>, f64, f64)> = measured
+    let mut local: Vec<Local> = measured
         .iter()
         .map(|m| {
             let offset = (m.point - seed) / radius;
             let (a, b) = (offset.dot(&u), offset.dot(&v));
             let near = (1.0 - (a * a + b * b)).max(0.0);
-            (
-                SVector::from([1.0, a, b, a * a, a * b, b * b]),
-                offset.dot(normal),
-                m.weight * near * near,
-            )
+            Local {
+                terms: SVector::from([1.0, a, b, a * a, a * b, b * b]),
+                height: offset.dot(normal),
+                sigma: m.sigma / radius,
+                scan: scans.partition_point(|s| *s < m.scan),
+                near: near * near,
+                robust: 1.0,
+            }
         })
         .collect();
-    let mut robust: Vec<f64> = vec![1.0; local.len()];
-    let mut coefficients = SVector::<f64, TERMS>::zeros();
-    let mut scale = f64::INFINITY;
+    let mut solved = None;
     for pass in 0..PASSES {
-        coefficients = solve(&local, &robust)?;
-        let mut absolute: Vec<f64> =
-            local.iter().map(|(x, h, _)| (h - x.dot(&coefficients)).abs()).collect();
-        let residuals = absolute.clone();
-        let middle = absolute.len() / 2;
-        let median = *absolute.select_nth_unstable_by(middle, f64::total_cmp).1;
-        scale = (1.4826 * median).max(floor / radius);
-        // The first pass may lean on an outlier or another sheet: be lenient, then strict.
-        let reach = if pass == 0 { 3.0 } else { 1.0 } * 4.685 * scale;
-        for (weight, r) in robust.iter_mut().zip(residuals) {
-            *weight = if r < reach { (1.0 - (r / reach).powi(2)).powi(2) } else { 0.0 };
-        }
+        let weights = weights(&local, scans.len(), noise);
+        let factor = factor(&local, &weights)?;
+        let coefficients = factor.solve(&right(&local, &weights));
+        reweight(&mut local, &coefficients, noise, pass == 0);
+        solved = Some((coefficients, weights, factor));
     }
+    let (coefficients, weights, factor) = solved?;
     let slope = u * coefficients[1] + v * coefficients[2];
-    let effective = robust.iter().sum();
-    let (sigma, support) = uncertainty(measured, &local, &robust, &coefficients, scale);
+    let spread = Spread::new(&local, scans.len(), &coefficients);
+    let variance = variance(&local, &weights, &factor, scans.len(), noise);
     Some(Fit {
         point: seed + normal * (coefficients[0] * radius),
         normal: (normal - slope).normalize(),
-        sigma: sigma * radius,
-        effective,
-        support,
+        sigma: variance.sqrt() * radius,
+        effective: local.iter().map(|l| l.robust).sum(),
+        support: spread.support,
+        moments: spread.moments,
     })
 }
 
-fn solve(local: &[(SVector<f64, TERMS>, f64, f64)], robust: &[f64]) -> Option<SVector<f64, TERMS>> {
+/// Inverse variances. What the neighbours of a scan share does not average out within the scan: each is given its
+/// part of the variance of all of them together.
+fn weights(local: &[Local], scans: usize, noise: &Components) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); scans];
+    for l in local {
+        let w = l.near * l.robust;
+        sums[l.scan].0 += w;
+        sums[l.scan].1 += w * w;
+    }
+    let count = |(sum, squares): (f64, f64)| if squares > 0.0 { sum * sum / squares } else { 1.0 };
+    let repeated: Vec<f64> = sums.into_iter().map(|s| noise.repeated(count(s))).collect();
+    local.iter().map(|l| l.near * l.robust / (l.sigma * l.sigma * repeated[l.scan])).collect()
+}
+
+fn right(local: &[Local], weights: &[f64]) -> Terms {
+    local.iter().zip(weights).map(|(l, w)| l.terms * (l.height * w)).sum()
+}
+
+fn factor(local: &[Local], weights: &[f64]) -> Option<Cholesky<f64, Const<TERMS>>> {
     let mut matrix = SMatrix::<f64, TERMS, TERMS>::zeros();
-    let mut right = SVector::<f64, TERMS>::zeros();
     let mut total = 0.0;
-    for ((x, h, weight), robust) in local.iter().zip(robust) {
-        let w = weight * robust;
-        matrix += x * x.transpose() * w;
-        right += x * (h * w);
+    for (l, w) in local.iter().zip(weights) {
+        matrix += l.terms * l.terms.transpose() * *w;
         total += w;
     }
     if total <= 0.0 {
@@ -105,39 +138,67 @@ fn solve(local: &[(SVector<f64, TERMS>, f64, f64)], robust: &[f64]) -> Option<SV
     {
         matrix[(i, i)] += belief * total;
     }
-    matrix.cholesky().map(|c| c.solve(&right))
+    matrix.cholesky()
 }
 
-/// Standard deviation of the height at the seed (in units of the radius) and number of scans. Scans err as a
-/// whole (pose, correlated noise), so the spread of their mean residuals counts, not that of the points.
-fn uncertainty(
-    measured: &[Measured],
-    local: &[(SVector<f64, TERMS>, f64, f64)],
-    robust: &[f64],
-    coefficients: &SVector<f64, TERMS>,
-    scale: f64,
-) -> (f64, u16) {
-    let mut scans: Vec<(u16, f64, f64)> = Vec::new();
-    let (mut total, mut squares) = (0.0, 0.0);
-    for ((m, (x, h, weight)), robust) in measured.iter().zip(local).zip(robust) {
-        let w = weight * robust;
-        if w <= 0.0 {
-            continue;
-        }
-        total += w;
-        squares += w * w;
-        let r = h - x.dot(coefficients);
-        match scans.iter_mut().find(|s| s.0 == m.scan) {
-            Some(sum) => {
-                sum.1 += w * r;
-                sum.2 += w;
-            }
-            None => scans.push((m.scan, w * r, w)),
-        }
+/// Tukey's weights by residuals in standard deviations.
+fn reweight(local: &mut [Local], coefficients: &Terms, noise: &Components, lenient: bool) {
+    let residual = |l: &Local| (l.height - l.terms.dot(coefficients)).abs() / l.sigma;
+    let mut sizes: Vec<f64> = local.iter().map(residual).collect();
+    let middle = sizes.len() / 2;
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let scale = (1.4826 * median).max(0.5 * noise.total().sqrt());
+    // The first pass may lean on an outlier or another sheet: be lenient, then strict.
+    let reach = if lenient { 3.0 } else { 1.0 } * TUKEY * scale;
+    for l in local {
+        let r = residual(l) / reach;
+        l.robust = if r < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 };
     }
-    let white = scale * squares.sqrt() / total.max(f64::MIN_POSITIVE);
-    let count = scans.len() as f64;
-    let between: f64 = scans.iter().map(|(_, sum, _)| (sum / total).powi(2)).sum();
-    let common = if scans.len() > 1 { (between * count / (count - 1.0)).sqrt() } else { scale };
-    (white.max(common), scans.len() as u16)
+}
+
+/// Variance of the height at the seed: that of a sum of the heights, of which those of one scan share a part.
+fn variance(
+    local: &[Local],
+    weights: &[f64],
+    factor: &Cholesky<f64, Const<TERMS>>,
+    scans: usize,
+    noise: &Components,
+) -> f64 {
+    let mut first = Terms::zeros();
+    first[0] = 1.0;
+    let influence = factor.solve(&first);
+    let (mut white, mut shared) = (0.0, vec![0.0; scans]);
+    for (l, w) in local.iter().zip(weights) {
+        let part = w * l.terms.dot(&influence) * l.sigma;
+        white += part * part;
+        shared[l.scan] += part;
+    }
+    noise.white * white + noise.shared * shared.iter().map(|s| s * s).sum::<f64>()
+}
+
+/// How the residuals of the scans spread.
+struct Spread {
+    moments: Moments,
+    /// Scans with a measurement that agrees.
+    support: u16,
+}
+
+impl Spread {
+    fn new(local: &[Local], scans: usize, coefficients: &Terms) -> Spread {
+        let mut sums = vec![[0.0; 4]; scans];
+        for l in local {
+            let w = l.near * l.robust;
+            let e = (l.height - l.terms.dot(coefficients)) / (l.sigma * TUKEY_VARIANCE.sqrt());
+            for (sum, value) in sums[l.scan].iter_mut().zip([w, w * w, w * e, w * e * e]) {
+                *sum += value;
+            }
+        }
+        sums.retain(|s| s[0] > 0.0);
+        let scan = |[w, ww, we, wee]: &[f64; 4]| {
+            let (mean, count) = (we / w, w * w / ww);
+            (mean, (wee / w - mean * mean).max(0.0) * count, count)
+        };
+        let found: Vec<(f64, f64, f64)> = sums.iter().map(scan).collect();
+        Spread { moments: Moments::of_scans(&found), support: found.len() as u16 }
+    }
 }

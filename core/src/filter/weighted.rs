@@ -2,19 +2,21 @@
 //! side of the surface.
 
 use super::FilterParams;
+use super::fitter::Fitter;
+use super::learnt::Learnt;
 use super::merged::Merged;
-use super::quadric::{Fit, Measured, fit};
-use crate::geometry::{Cloud, Vec3};
+use super::quadric::Fit;
+use crate::geometry::{Cloud, Components, Vec3};
 use crate::voxel::{CellIndex, keep_apart, sides};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
 /// Points with less than this share of the median number of agreeing measurements float in space.
 const LEAST_SHARE: f64 = 0.08;
-/// Of the measurements near a point that has a surface, at least this share agree with it.
-const LEAST_AGREEMENT: f64 = 0.35;
 /// Radius within which standard deviations are pooled, in reduction radii: some thirty points.
 const POOL: f64 = 3.0;
+/// Scans' worth of belief in the noise that is common to all points.
+const COMMON_BELIEF: f64 = 5.0;
 /// Seeds between two reports of progress.
 const BATCH: usize = 4096;
 
@@ -23,24 +25,22 @@ pub(super) fn filter(
     noise_radius: f64,
     reduction_radius: f64,
     params: &FilterParams,
+    noise: &Learnt,
     progress: &Progress,
 ) -> Result<Cloud> {
-    let cells = CellIndex::new(&merged.points, noise_radius);
     let seeds = seeds(merged, reduction_radius, params);
+    let fitter = Fitter::new(merged, noise_radius, params, noise.components);
     let mut fits: Vec<Fit> = Vec::new();
     for (batch, chunk) in seeds.chunks(BATCH).enumerate() {
         progress.report("filter", (batch * BATCH) as f64 / seeds.len() as f64)?;
-        let fitted: Vec<Option<Fit>> = chunk
-            .par_iter()
-            .map(|&seed| fit_seed(merged, &cells, seed, noise_radius, params))
-            .collect();
+        let fitted: Vec<Option<Fit>> = chunk.par_iter().map(|&seed| fitter.fit(seed)).collect();
         fits.extend(fitted.into_iter().flatten());
     }
-    Ok(thin(fits, reduction_radius))
+    Ok(thin(fits, reduction_radius, &noise.components))
 }
 
 /// In each cell of the reduction radius, the most central measurement of each side of the surface.
-fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParams) -> Vec<usize> {
+pub(super) fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParams) -> Vec<usize> {
     let cells = CellIndex::new(&merged.points, reduction_radius);
     let cosine = params.max_normal_angle.cos();
     let in_cell = |cell| {
@@ -57,83 +57,43 @@ fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParams) -> Vec<u
     chosen.into_iter().flatten().collect()
 }
 
-fn fit_seed(
-    merged: &Merged,
-    cells: &CellIndex,
-    seed: usize,
-    radius: f64,
-    params: &FilterParams,
-) -> Option<Fit> {
-    let point = merged.points[seed];
-    let cosine = params.max_normal_angle.cos();
-    let mut near: Vec<usize> = Vec::new();
-    cells.for_each_within(&merged.points, &point, radius, |i, _| near.push(i));
-    let normal = mean_normal(merged, &near, &merged.normals[seed], cosine)?;
-    let floor = f64::from(merged.noise[seed]) * 0.5;
-    let measured: Vec<Measured> = near
-        .iter()
-        .filter(|&&i| merged.normals[i].dot(&normal) >= cosine)
-        .map(|&i| {
-            // Depth noise grows with the incidence; its square is the weight's inverse.
-            let incidence = merged.rays[i].dot(&normal).abs().max(0.1);
-            let noise = f64::from(merged.noise[i]);
-            Measured {
-                point: merged.points[i],
-                scan: merged.scan[i],
-                weight: (incidence / noise).powi(2),
-            }
-        })
-        .collect();
-    if measured.len() < params.min_measurements {
-        return None;
-    }
-    let fit = fit(&measured, &point, &normal, radius, floor)?;
-    let moved = (fit.point - point).norm();
-    let good = fit.effective >= params.min_measurements as f64 / 2.0
-        && fit.effective >= LEAST_AGREEMENT * measured.len() as f64
-        && moved < 0.7 * radius
-        && fit.normal.dot(&normal) > cosine;
-    good.then_some(fit)
-}
-
-/// Mean of the normals on the side of `start`, twice, so that the start matters little.
-fn mean_normal(merged: &Merged, near: &[usize], start: &Vec3, cosine: f64) -> Option<Vec3> {
-    (0..2).try_fold(*start, |axis, _| {
-        let alike = near.iter().map(|&i| merged.normals[i]).filter(|n| n.dot(&axis) >= cosine);
-        alike.sum::<Vec3>().try_normalize(0.0)
-    })
-}
-
 /// Keeps the best supported points, about a reduction radius from each other on each side.
-fn thin(fits: Vec<Fit>, reduction_radius: f64) -> Cloud {
+fn thin(fits: Vec<Fit>, reduction_radius: f64, noise: &Components) -> Cloud {
     let usual = crate::geometry::median(fits.iter().map(|f| f.effective).collect()).unwrap_or(0.0);
     let fits: Vec<Fit> = fits.into_iter().filter(|f| f.effective >= LEAST_SHARE * usual).collect();
     let mut order: Vec<usize> = (0..fits.len()).collect();
     order.sort_by(|&a, &b| fits[b].effective.total_cmp(&fits[a].effective).then(a.cmp(&b)));
     let points: Vec<Vec3> = fits.iter().map(|f| f.point).collect();
     let normals: Vec<Vec3> = fits.iter().map(|f| f.normal).collect();
+    let kept = keep_apart(&points, &normals, &order, reduction_radius);
     let mut cloud = Cloud::default();
-    for i in keep_apart(&points, &normals, &order, reduction_radius) {
+    for &i in &kept {
         let fit = &fits[i];
         cloud.push(fit.point, fit.normal, fit.sigma, fit.support);
     }
-    cloud.sigma = pooled_sigma(&cloud, POOL * reduction_radius);
+    let excess: Vec<(f64, f64)> = kept.iter().map(|&i| fits[i].moments.excess(noise)).collect();
+    cloud.sigma = corrected_sigma(&cloud, &excess, POOL * reduction_radius);
     cloud
 }
 
-/// The root mean square of the neighbours' standard deviations. One taken from a handful of scans is itself uncertain
-/// by a third; weights made of it would favour the points that are certain by luck alone.
-fn pooled_sigma(cloud: &Cloud, radius: f64) -> Vec<f64> {
+/// Standard deviations, times what the scans near a point differ more or less from each other than the noise lets
+/// expect: where poses err or the surface is no quadric. One point's spread is uncertain by a third; weights made of
+/// it would favour the points that are certain by luck alone. So neighbours are pooled, and the common noise is
+/// believed as much as so many scans.
+fn corrected_sigma(cloud: &Cloud, excess: &[(f64, f64)], radius: f64) -> Vec<f64> {
     let cells = CellIndex::new(&cloud.points, radius);
-    let pooled = |i: usize| {
-        let (mut sum, mut count) = (0.0, 0.0);
+    let corrected = |i: usize| {
+        let (mut ratio, mut scans, mut count) = (0.0, 0.0, 0.0);
         cells.for_each_within(&cloud.points, &cloud.points[i], radius, |j, _| {
             if cloud.normals[j].dot(&cloud.normals[i]) > 0.0 {
-                sum += cloud.sigma[j] * cloud.sigma[j];
+                ratio += excess[j].0 * excess[j].1;
+                scans += excess[j].1;
                 count += 1.0;
             }
         });
-        f64::sqrt(sum / count)
+        // Neighbours see the same scans' errors: they are counted once.
+        let pooled = (ratio / count + COMMON_BELIEF) / (scans / count + COMMON_BELIEF);
+        cloud.sigma[i] * pooled.sqrt()
     };
-    (0..cloud.len()).into_par_iter().map(pooled).collect()
+    (0..cloud.len()).into_par_iter().map(corrected).collect()
 }

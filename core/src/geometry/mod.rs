@@ -5,6 +5,7 @@ mod cloud;
 mod fit;
 mod kdtree;
 mod median;
+mod noise;
 mod pose;
 mod sensor;
 mod shape;
@@ -15,6 +16,7 @@ pub use cloud::{Cloud, Scan};
 pub use fit::{PlaneFit, any_orthogonal, fit_plane};
 pub use kdtree::KdTree;
 pub(crate) use median::median;
+pub use noise::{Components, Moments, NoiseModel, Residual};
 pub use pose::{
     Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,
 };

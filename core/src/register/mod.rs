@@ -24,7 +24,7 @@ mod whiten;
 
 pub use align::{Kernel, Matching, Rejection, Selection, Weight};
 pub use pair::{PairScan, align_pair};
-pub use prepare::PreparedScan;
+pub use prepare::{PreparedScan, Unoriented};
 pub use registrar::Registrar;
 pub use variants::{Variant, variants};
 pub use verdict::{Status, Verdict};

@@ -1,6 +1,6 @@
 //! From a raw scan to oriented points in the sensor frame.
 
-use crate::geometry::{Cloud, KdTree, Scan, Vec3, fit_plane, median};
+use crate::geometry::{Cloud, KdTree, NoiseModel, Residual, Scan, Vec3, fit_plane, median};
 use crate::voxel::CellIndex;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -18,10 +18,37 @@ pub struct PreparedScan {
     pub spacing: f64,
     /// Standard deviation of the points about their local planes, metres.
     pub noise: f64,
+    /// The same for each point, along its normal, by range and incidence, metres.
+    pub sigma: Vec<f32>,
+    /// Distance of the sensor, metres.
+    pub range: Vec<f32>,
+    /// What `sigma` was taken from.
+    pub model: NoiseModel,
+    /// Which point of the raw scan each was; where several were merged, the first of them.
+    pub source: Vec<u32>,
+    /// Points of the raw scan that have no normal.
+    pub aside: Vec<Unoriented>,
+}
+
+/// A point that has too few neighbours for a normal, lies off their plane or at grazing incidence, sensor frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unoriented {
+    /// Position, metres.
+    pub point: Vec3,
+    /// Unit vector along the ray, away from the sensor.
+    pub ray: Vec3,
+    /// Distance of the sensor, metres.
+    pub range: f32,
+    /// Which point of the raw scan it was.
+    pub source: u32,
 }
 
 /// Points sampled to learn a scan's spacing and noise: enough for a median to 3 %.
 const PROBES: usize = 1500;
+/// Residuals from which the noise is learnt by range and incidence: some thousand a class.
+const RESIDUALS: usize = 20_000;
+/// Radius, in spacings, of the planes whose residuals tell the noise.
+const SMALL: f64 = 2.0;
 /// Fewer neighbours than this support no plane.
 const LEAST_NEIGHBOURS: usize = 6;
 /// Beyond this angle of incidence a "surface" is mostly flying points between two depths.
@@ -37,18 +64,19 @@ impl PreparedScan {
     /// # Errors
     /// [`Error::Input`] if fewer than 10 points have a return or all coincide.
     pub fn new(scan: &Scan) -> Result<PreparedScan> {
-        let (points, rays) = thinned(scan);
+        let raw = Raw::of(scan);
+        let points = &raw.points;
         if points.len() < 10 {
             return Err(Error::input(format!(
                 "the scan has {} points with a return; at least 10 are needed",
                 points.len()
             )));
         }
-        let spacing = median_spacing(&points);
+        let spacing = median_spacing(points);
         if spacing <= 0.0 {
             return Err(Error::input("most points of the scan coincide; is the file corrupt?"));
         }
-        let probe = Neighbourhood::new(&points, 3.0 * spacing);
+        let probe = Neighbourhood::new(points, 3.0 * spacing);
         let stride = points.len().div_ceil(PROBES);
         let residuals =
             (0..points.len()).step_by(stride).filter_map(|i| probe.fit(i)).map(|f| f.noise);
@@ -56,20 +84,14 @@ impl PreparedScan {
         // The tilt of a plane fitted to n points within r is about 2 noise / (r sqrt(n)): six times the noise
         // keeps it to a few degrees.
         let radius = (3.0 * spacing).max(6.0 * noise);
-        let fits = Neighbourhood::new(&points, radius);
+        let fits = Neighbourhood::new(points, radius);
         let oriented: Vec<Option<Vec3>> = (0..points.len())
             .into_par_iter()
-            .map(|i| oriented_normal(&fits, i, &rays[i], noise))
+            .map(|i| oriented_normal(&fits, i, &raw.rays[i], noise))
             .collect();
-        let mut prepared = PreparedScan { spacing, noise, ..PreparedScan::default() };
-        for (i, normal) in oriented.into_iter().enumerate() {
-            if let Some(normal) = normal {
-                prepared.points.push(points[i]);
-                prepared.normals.push(normal);
-                prepared.rays.push(rays[i]);
-            }
-        }
-        Ok(prepared)
+        let model = raw.noise_model(&oriented, spacing).unwrap_or(NoiseModel::constant(noise));
+        Ok(raw
+            .prepared(&oriented, PreparedScan { spacing, noise, model, ..PreparedScan::default() }))
     }
 
     /// A cloud that has normals already; each point counts as seen head on.
@@ -92,7 +114,19 @@ impl PreparedScan {
             spacing,
             // Without a stated uncertainty the points are taken as they are.
             noise: median(known).unwrap_or(0.1 * spacing),
-        })
+            ..PreparedScan::default()
+        }
+        .with_sigma_of(cloud))
+    }
+
+    fn with_sigma_of(mut self, cloud: &Cloud) -> PreparedScan {
+        let noise = self.noise;
+        let stated = |s: &f64| if s.is_finite() { *s as f32 } else { noise as f32 };
+        self.sigma = cloud.sigma.iter().map(stated).collect();
+        self.model = NoiseModel::constant(noise);
+        self.range = vec![1.0; cloud.len()];
+        self.source = (0..cloud.len() as u32).collect();
+        self
     }
 
     /// One point a cubic cell, so that about `count` remain: indices, ascending by cell.
@@ -122,30 +156,88 @@ fn most_central(points: &[Vec3], members: &[u32]) -> usize {
     nearest.map_or(0, |i| i as usize)
 }
 
-fn thinned(scan: &Scan) -> (Vec<Vec3>, Vec<Vec3>) {
-    let indices: Vec<usize> = scan.returns().collect();
-    let point = |i: usize| scan.point(i).unwrap_or_else(Vec3::zeros);
-    let ray = |i: usize| (point(i) - scan.origin(i)).try_normalize(0.0).unwrap_or_else(Vec3::z);
-    if indices.len() <= MOST_POINTS {
-        return (
-            indices.iter().map(|&i| point(i)).collect(),
-            indices.iter().map(|&i| ray(i)).collect(),
-        );
+/// The returns of a scan, thinned if there are too many.
+struct Raw {
+    points: Vec<Vec3>,
+    rays: Vec<Vec3>,
+    ranges: Vec<f64>,
+    source: Vec<u32>,
+}
+
+impl Raw {
+    fn of(scan: &Scan) -> Raw {
+        let indices: Vec<usize> = scan.returns().collect();
+        let point = |&i: &usize| scan.point(i).unwrap_or_else(Vec3::zeros);
+        let sight: Vec<Vec3> = indices.iter().map(|i| point(i) - scan.origin(*i)).collect();
+        let raw = Raw {
+            points: indices.iter().map(point).collect(),
+            rays: sight.iter().map(|s| s.try_normalize(0.0).unwrap_or_else(Vec3::z)).collect(),
+            ranges: sight.iter().map(Vec3::norm).collect(),
+            source: indices.iter().map(|&i| i as u32).collect(),
+        };
+        if indices.len() <= MOST_POINTS { raw } else { raw.thinned() }
     }
-    let points: Vec<Vec3> = indices.iter().map(|&i| point(i)).collect();
-    let mut edge = median_spacing(&points) * (points.len() as f64 / MOST_POINTS as f64).sqrt();
-    if edge <= 0.0 {
-        edge = 1e-6;
+
+    fn thinned(&self) -> Raw {
+        let count = self.points.len() as f64;
+        let mut edge = median_spacing(&self.points) * (count / MOST_POINTS as f64).sqrt();
+        if edge <= 0.0 {
+            edge = 1e-6;
+        }
+        let cells = CellIndex::new(&self.points, edge);
+        let members = |cell| cells.points_in(cell);
+        let mean = |members: &[u32], of: &[Vec3]| {
+            members.iter().map(|&i| of[i as usize]).sum::<Vec3>() / members.len() as f64
+        };
+        let all = || cells.cells().iter().map(|&cell| members(cell));
+        Raw {
+            points: all().map(|m| mean(m, &self.points)).collect(),
+            rays: all()
+                .map(|m| mean(m, &self.rays).try_normalize(0.0).unwrap_or_else(Vec3::z))
+                .collect(),
+            ranges: all().map(|m| self.ranges[m[0] as usize]).collect(),
+            source: all().map(|m| self.source[m[0] as usize]).collect(),
+        }
     }
-    let cells = CellIndex::new(&points, edge);
-    let merged = cells.cells().iter().map(|&cell| {
-        let members = cells.points_in(cell);
-        let count = members.len() as f64;
-        let mean = members.iter().map(|&i| points[i as usize]).sum::<Vec3>() / count;
-        let ray = members.iter().map(|&i| ray(indices[i as usize])).sum::<Vec3>() / count;
-        (mean, ray.try_normalize(0.0).unwrap_or_else(Vec3::z))
-    });
-    merged.unzip()
+
+    /// The noise by range and incidence, from distances to planes so small that no curvature counts.
+    fn noise_model(&self, oriented: &[Option<Vec3>], spacing: f64) -> Option<NoiseModel> {
+        let near = Neighbourhood::new(&self.points, SMALL * spacing);
+        let stride = oriented.len().div_ceil(RESIDUALS).max(1);
+        let some: Vec<usize> = (0..oriented.len()).step_by(stride).collect();
+        let residual = |&i: &usize| {
+            let (normal, fit) = (oriented[i]?, near.fit(i)?);
+            let off = (self.points[i] - fit.center).dot(&fit.normal);
+            Some(Residual {
+                range: self.ranges[i],
+                cosine: normal.dot(&self.rays[i]).abs(),
+                // In the middle of its neighbours a point's leverage in their plane is 1 / count.
+                distance: off / (1.0 - 1.0 / fit.count).sqrt(),
+            })
+        };
+        let residuals: Vec<Option<Residual>> = some.par_iter().map(residual).collect();
+        let residuals: Vec<Residual> = residuals.into_iter().flatten().collect();
+        NoiseModel::estimate(&residuals).map(NoiseModel::of_sensor)
+    }
+
+    /// Fills in the points with a normal and those without.
+    fn prepared(&self, oriented: &[Option<Vec3>], mut prepared: PreparedScan) -> PreparedScan {
+        for (i, oriented) in oriented.iter().enumerate() {
+            let (point, ray, range, source) =
+                (self.points[i], self.rays[i], self.ranges[i], self.source[i]);
+            let Some(normal) = oriented else {
+                prepared.aside.push(Unoriented { point, ray, range: range as f32, source });
+                continue;
+            };
+            prepared.points.push(point);
+            prepared.normals.push(*normal);
+            prepared.rays.push(ray);
+            prepared.sigma.push(prepared.model.at(range, normal.dot(&ray)) as f32);
+            prepared.range.push(range as f32);
+            prepared.source.push(source);
+        }
+        prepared
+    }
 }
 
 fn median_spacing(points: &[Vec3]) -> f64 {
@@ -169,6 +261,7 @@ struct LocalFit {
     normal: Vec3,
     center: Vec3,
     noise: f64,
+    count: f64,
 }
 
 impl<'a> Neighbourhood<'a> {
@@ -191,7 +284,7 @@ impl<'a> Neighbourhood<'a> {
             return None;
         }
         let noise = (fit.variances[0] * count / (count - 3.0)).sqrt();
-        Some(LocalFit { normal: fit.normal, center: fit.center, noise })
+        Some(LocalFit { normal: fit.normal, center: fit.center, noise, count })
     }
 }
 

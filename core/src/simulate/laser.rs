@@ -17,9 +17,9 @@ const POINTS: usize = StriperModel::SCANCONTROL.points;
 /// length of the spot on the surface, 1 / cos of the incidence.
 const SIGMA: [f64; 2] = [0.05e-3, 0.2e-3];
 /// Share of outliers.
-const OUTLIERS: f64 = 0.0005;
+pub(super) const OUTLIERS: f64 = 0.0005;
 /// Standard deviation per axis of the arm's wander from one profile to the next, metres.
-const JITTER: f64 = 0.007e-3;
+pub(super) const JITTER: f64 = 0.007e-3;
 /// Depth difference between neighbours that makes an edge, metres; a slope of 80 degrees stays below.
 const EDGE: f64 = 3e-3;
 /// Share of edge points where the spot is split between both sides.
@@ -133,7 +133,7 @@ impl Striper {
 }
 
 /// Standard deviation along the ray, metres.
-fn sigma(cosine: f64) -> f64 {
+pub(super) fn sigma(cosine: f64) -> f64 {
     (SIGMA[0] / cosine).min(SIGMA[1])
 }
 

@@ -13,11 +13,13 @@ pub mod objects;
 mod robot;
 mod scene;
 mod stereo;
+mod truth;
 mod views;
 
 pub use cell::{Cell, sensor_of};
 pub use labels::{FLYING, GOOD, OUTLIER, SURROUNDINGS};
 pub use noise::NoiseFamily;
+pub use truth::{TrueNoise, add_outliers, outlier_share};
 pub use views::view_poses;
 
 use crate::geometry::{Pose, Scan, SensorModel, Vec3};

@@ -55,6 +55,7 @@ pub(crate) enum Use {
     Correlated = 2,
     Sweep = 3,
     Robot = 4,
+    Outliers = 5,
 }
 
 /// The source of all chance of one view.

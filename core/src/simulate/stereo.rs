@@ -30,7 +30,7 @@ const QUANTUM: f64 = 1.0 / 16.0;
 /// Smaller disparities are not looked for, pixels of the image.
 const LEAST_DISPARITY: f64 = 2.0;
 /// Share of outliers.
-const OUTLIERS: f64 = 0.01;
+pub(super) const OUTLIERS: f64 = 0.01;
 /// Outliers lie this much nearer or farther than the object can, metres.
 const OUTLIER_MARGIN: f64 = 0.05;
 /// Depth difference between neighbours that makes an edge, metres; a slope of 75 degrees stays below.
@@ -135,6 +135,20 @@ impl Matcher<'_> {
         };
         (row * GRID[0]..(row + 1) * GRID[0]).map(&mut measure).collect()
     }
+}
+
+/// Standard deviation of the depth, metres, at a depth (metres) and cosine of incidence.
+pub(super) fn sigma(depth: f64, cosine: f64) -> f64 {
+    // Rounding to a step adds the variance of a uniform error.
+    let rounding = QUANTUM * QUANTUM / 12.0;
+    let matching = (WHITE * WHITE + CORRELATED * CORRELATED) / cosine.powf(2.0 * SLANT);
+    depth * depth / (focal_length() * BASELINE) * (matching + rounding).sqrt()
+}
+
+/// Correlation of the depth errors of two pixels so many columns and rows apart.
+pub(super) fn correlation(columns: f64, rows: f64) -> f64 {
+    let share = CORRELATED * CORRELATED / (WHITE * WHITE + CORRELATED * CORRELATED);
+    share * (-(columns * columns + rows * rows) / (CORRELATION_LENGTH * CORRELATION_LENGTH)).exp()
 }
 
 /// Probability that a point is lost: none up to 50 degrees of incidence, all from 75 on, linear between.
