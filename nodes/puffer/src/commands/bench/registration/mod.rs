@@ -4,8 +4,8 @@ mod found;
 mod growth;
 mod row;
 
+use super::family;
 use crate::commands::simulate::{truth_of, write_folder};
-use crate::failure::usage;
 use crate::parameters::ParameterArgs;
 use crate::table::print_text;
 use anyhow::{Context, Result};
@@ -13,11 +13,10 @@ use clap::Args;
 use found::{Found, Prepared};
 use puffer_core::Progress;
 use puffer_core::mesh::Mesh;
-use puffer_core::params::ParamValue;
 use puffer_core::register::{RegisterParams, Variant, variants};
 use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, simulate};
 use row::{heading, measure, variants_heading, worst};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Registers simulated scans and measures the poses against the true ones, over several seeds.
@@ -155,10 +154,4 @@ impl Registration {
         let prepared = Prepared::new(scans).with_context(|| case.name())?;
         Found::ours(scans, &prepared, params).with_context(|| case.name())
     }
-}
-
-fn family(word: &str) -> Result<NoiseFamily> {
-    NoiseFamily::from_value(&Value::from(word)).ok_or_else(|| {
-        usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
-    })
 }
