@@ -1,8 +1,8 @@
 //! The map that scans are aligned to.
 //!
 //! What a scan shows of known surface adds no point and costs a look into a hash map. New points have the search tree
-//! built anew: measured over a hundred scans, that is two to three times as fast as a forest of trees (Bentley & Saxe
-//! 1980), whose newer trees hold scattered points and make every search longer.
+//! built anew: over a hundred scans about twice as fast as a forest of trees (Bentley & Saxe 1980), whose newer trees hold
+//! scattered points and make every search longer.
 
 use crate::geometry::{KdTree, Pose, Vec3};
 use crate::voxel::{Voxel, voxel_of};

@@ -103,7 +103,7 @@ mod tests {
         points.extend((0..60).map(|i| Vec3::new(60.0, f64::from(i), 1.0)));
         normals.extend([-Vec3::x(); 60]);
         let rays = normals.iter().map(|n| -n).collect();
-        PreparedScan { points, normals, rays, spacing: 1.0, noise: 0.01 }
+        PreparedScan { points, normals, rays, spacing: 1.0, noise: 0.01, ..PreparedScan::default() }
     }
 
     fn chosen(selection: Selection) -> Vec<usize> {
