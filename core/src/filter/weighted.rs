@@ -7,7 +7,7 @@ use super::learnt::Learnt;
 use super::merged::Merged;
 use super::quadric::Fit;
 use crate::geometry::{Cloud, Components, Vec3};
-use crate::voxel::{CellIndex, keep_apart, sides};
+use crate::voxel::{CellIndex, keep_apart, most_central, sides};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
@@ -44,14 +44,8 @@ pub(super) fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParam
     let cells = CellIndex::new(&merged.points, reduction_radius);
     let cosine = params.max_normal_angle.cos();
     let in_cell = |cell| {
-        let central = |same: Vec<u32>| {
-            let mean =
-                same.iter().map(|&i| merged.points[i as usize]).sum::<Vec3>() / same.len() as f64;
-            let distance = |i: &u32| (merged.points[*i as usize] - mean).norm_squared();
-            same.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|i| i as usize)
-        };
         let found = sides(cells.points_in(cell), &merged.normals, cosine);
-        found.into_iter().filter_map(central).collect()
+        found.iter().filter_map(|side| most_central(&merged.points, side)).collect()
     };
     let chosen: Vec<Vec<usize>> = cells.cells().par_iter().map(|&cell| in_cell(cell)).collect();
     chosen.into_iter().flatten().collect()

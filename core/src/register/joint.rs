@@ -196,12 +196,8 @@ impl Measured {
     }
 
     fn residuals(&self, terms: &[Term]) -> Residuals {
-        let ray = terms.iter().map(|t| t.at).sum::<Vec3>().try_normalize(0.0);
-        let ray = ray.unwrap_or_else(Vec3::z);
-        Residuals {
-            at: terms.iter().map(|t| t.at - ray * ray.dot(&t.at)).collect(),
-            value: terms.iter().map(|t| t.residual * self.precision(t)).collect(),
-        }
+        let value = terms.iter().map(|t| t.residual * self.precision(t)).collect();
+        Residuals { at: across(terms), value }
     }
 
     /// Hessian and gradient by the poses of the geometry's half squared error.
@@ -212,7 +208,6 @@ impl Measured {
 
     /// The equations of one scan, their noise white.
     fn rows(&self, terms: &[Term]) -> Vec<Row> {
-        let at = self.residuals(terms).at;
         let equation = |white: WhiteRow| {
             let mut row = Row { jacobian: Twist::zeros(), residual: 0.0, heights: Vec::new() };
             for (index, coefficient) in white.terms {
@@ -224,8 +219,15 @@ impl Measured {
             }
             row
         };
-        whiten(&at, &self.correlation).into_iter().map(equation).collect()
+        whiten(&across(terms), &self.correlation).into_iter().map(equation).collect()
     }
+}
+
+/// Where a scan's measurements lie across its line of sight, metres.
+fn across(terms: &[Term]) -> Vec<Vec3> {
+    let ray = terms.iter().map(|t| t.at).sum::<Vec3>().try_normalize(0.0);
+    let ray = ray.unwrap_or_else(Vec3::z);
+    terms.iter().map(|t| t.at - ray * ray.dot(&t.at)).collect()
 }
 
 /// The mean height of each surfel over the scans that saw it, with the number of scans.

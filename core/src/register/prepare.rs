@@ -1,7 +1,7 @@
 //! From a raw scan to oriented points in the sensor frame.
 
 use crate::geometry::{Cloud, KdTree, NoiseModel, Residual, Scan, Vec3, fit_plane, median};
-use crate::voxel::CellIndex;
+use crate::voxel::{CellIndex, most_central};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -107,26 +107,21 @@ impl PreparedScan {
             )));
         }
         let known = cloud.sigma.iter().copied().filter(|s| s.is_finite()).collect();
+        // Without a stated uncertainty the points are taken as they are.
+        let noise = median(known).unwrap_or(0.1 * spacing);
+        let stated = |s: &f64| if s.is_finite() { *s as f32 } else { noise as f32 };
         Ok(PreparedScan {
             points: cloud.points.clone(),
             normals: cloud.normals.clone(),
             rays: cloud.normals.iter().map(|n| -n).collect(),
             spacing,
-            // Without a stated uncertainty the points are taken as they are.
-            noise: median(known).unwrap_or(0.1 * spacing),
+            noise,
+            sigma: cloud.sigma.iter().map(stated).collect(),
+            model: NoiseModel::constant(noise),
+            range: vec![1.0; cloud.len()],
+            source: (0..cloud.len() as u32).collect(),
             ..PreparedScan::default()
-        }
-        .with_sigma_of(cloud))
-    }
-
-    fn with_sigma_of(mut self, cloud: &Cloud) -> PreparedScan {
-        let noise = self.noise;
-        let stated = |s: &f64| if s.is_finite() { *s as f32 } else { noise as f32 };
-        self.sigma = cloud.sigma.iter().map(stated).collect();
-        self.model = NoiseModel::constant(noise);
-        self.range = vec![1.0; cloud.len()];
-        self.source = (0..cloud.len() as u32).collect();
-        self
+        })
     }
 
     /// One point a cubic cell, so that about `count` remain: indices, ascending by cell.
@@ -141,19 +136,12 @@ impl PreparedScan {
                 return cells
                     .cells()
                     .iter()
-                    .map(|c| most_central(&self.points, cells.points_in(*c)))
+                    .filter_map(|c| most_central(&self.points, cells.points_in(*c)))
                     .collect();
             }
             edge *= 1.15;
         }
     }
-}
-
-fn most_central(points: &[Vec3], members: &[u32]) -> usize {
-    let mean = members.iter().map(|&i| points[i as usize]).sum::<Vec3>() / members.len() as f64;
-    let distance = |i: u32| (points[i as usize] - mean).norm_squared();
-    let nearest = members.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-    nearest.map_or(0, |i| i as usize)
 }
 
 /// The returns of a scan, thinned if there are too many.

@@ -72,6 +72,14 @@ impl CellIndex {
     }
 }
 
+/// Of `members` (indices into `points`), the one nearest to their mean.
+pub fn most_central(points: &[Vec3], members: &[u32]) -> Option<usize> {
+    let mean = members.iter().map(|&i| points[i as usize]).sum::<Vec3>() / members.len() as f64;
+    let distance = |i: u32| (points[i as usize] - mean).norm_squared();
+    let nearest = members.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    nearest.map(|i| i as usize)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

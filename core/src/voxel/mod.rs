@@ -11,7 +11,7 @@ mod sides;
 mod space;
 mod walk;
 
-pub use cells::CellIndex;
+pub use cells::{CellIndex, most_central};
 pub use grid::{BlockGrid, Step, Walk};
 pub use set::SlotSet;
 pub(crate) use sides::{keep_apart, sides};
