@@ -11,15 +11,17 @@
 //! the true covariance. Nothing is added for outliers, robustness, edges or thinning. The **oracle**'s limit, in addition,
 //! knows which profiles the arm's wander hits least, which no filter can.
 
+use super::align::apply;
+use super::distances::MM;
 use super::reference::Reference;
-use super::stats::{rms, share};
+use super::stats::{mean, rms, share};
 use crate::filter::Filtered;
-use crate::geometry::{Pose, Vec3, any_orthogonal};
+use crate::geometry::{Vec3, any_orthogonal};
 use crate::mesh::Mesh;
-use crate::simulate::{FLYING, GOOD, OUTLIER, SimulatedScans, SimulatedView, TrueNoise};
+use crate::simulate::{FLYING, GOOD, OUTLIER, SimulatedScans, TrueNoise};
 use crate::voxel::CellIndex;
 use crate::{Progress, Result};
-use nalgebra::{DMatrix, Point3, SMatrix};
+use nalgebra::{DMatrix, SMatrix};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -29,8 +31,6 @@ const FAR: f64 = 4.0;
 const LIMITED: usize = 600;
 /// Cosine between the normals of one side of a surface at least.
 const ONE_SIDE: f64 = 0.7;
-/// Millimetres in a metre.
-const MM: f64 = 1e3;
 
 /// Figures of a filtered cloud. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -85,7 +85,7 @@ pub fn filter_figures(
     progress.report("figures", 0.0)?;
     let reference = Reference::new(truth)?;
     let views: Vec<Vec<Truth>> =
-        scans.views.iter().map(|view| truths(view, scans, &reference)).collect();
+        (0..scans.views.len()).map(|scan| truths(scans, scan, &reference)).collect();
     let counts = Counts::of(&views, filtered);
     progress.report("figures", 0.5)?;
     let cloud = &filtered.cloud;
@@ -114,7 +114,7 @@ pub fn filter_figures(
         within_1_sigma: share(&ratios, |r| r <= 1.0),
         within_2_sigma: share(&ratios, |r| r <= 2.0),
         sigma: MM * rms(&cloud.sigma),
-        bias: MM * super::stats::mean(&errors),
+        bias: MM * mean(&errors),
     })
 }
 
@@ -140,21 +140,21 @@ enum Kind {
     Neither,
 }
 
-fn truths(view: &SimulatedView, scans: &SimulatedScans, reference: &Reference) -> Vec<Truth> {
+/// Of the returns of one scan.
+fn truths(scans: &SimulatedScans, scan: usize, reference: &Reference) -> Vec<Truth> {
+    let view = &scans.views[scan];
     let noise = TrueNoise::new(scans.family, view.scan.width, view.scan.height());
-    let scan = scans.views.iter().position(|v| std::ptr::eq(v, view)).unwrap_or(0);
-    let place = |pose: &Pose, p: &Vec3| (pose * Point3::from(*p)).coords;
     let of = |index: usize| -> Option<Truth> {
         let measured = view.scan.point(index)?;
         let in_sensor = Vec3::from(view.hits[index].map(f64::from));
         let ray = (measured - view.scan.origin(index)).try_normalize(0.0)?;
-        let hit = place(&view.true_pose, &in_sensor);
+        let hit = apply(&view.true_pose, &in_sensor);
         let normal = reference.nearest(&hit).normal;
         let cosine = (view.true_pose.rotation * ray).dot(&normal).abs().max(1e-3);
         let sigma = noise.sigma(&in_sensor, &ray, cosine) * cosine;
         let kind = match view.labels[index] {
             OUTLIER | FLYING => {
-                let distance = reference.nearest(&place(&view.true_pose, &measured)).distance;
+                let distance = reference.nearest(&apply(&view.true_pose, &measured)).distance;
                 let far = FAR * sigma.hypot(noise.wander(index, index).sqrt());
                 if distance > far { Kind::Outlier } else { Kind::Neither }
             }

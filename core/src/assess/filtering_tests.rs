@@ -1,5 +1,6 @@
 use super::*;
 use crate::filter::{FilterParams, filter};
+use crate::geometry::Pose;
 use crate::mesh::test_shapes::cuboid;
 use crate::register::PreparedScan;
 use crate::simulate::{NoiseFamily, SimulateParams, add_outliers, simulate};

@@ -9,10 +9,11 @@ mod registration;
 mod transport;
 
 use crate::failure::usage;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use puffer_core::params::ParamValue;
-use puffer_core::simulate::NoiseFamily;
+use puffer_core::register::PreparedScan;
+use puffer_core::simulate::{NoiseFamily, SimulatedScans, SimulatedView};
 use serde_json::Value;
 
 /// Measures a part of the system on this machine.
@@ -51,4 +52,12 @@ fn family(word: &str) -> Result<NoiseFamily> {
     NoiseFamily::from_value(&Value::from(word)).ok_or_else(|| {
         usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
     })
+}
+
+/// The scans made ready for registration and filter.
+fn prepared(scans: &SimulatedScans) -> Result<Vec<PreparedScan>> {
+    let view = |(i, v): (usize, &SimulatedView)| {
+        PreparedScan::new(&v.scan).with_context(|| format!("view {i}"))
+    };
+    scans.views.iter().enumerate().map(view).collect()
 }

@@ -2,11 +2,11 @@
 
 mod row;
 
-use super::family;
+use super::{family, prepared};
 use crate::commands::simulate::truth_of;
 use crate::parameters::ParameterArgs;
 use crate::table::print_text;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use puffer_core::Progress;
 use puffer_core::assess::filter_figures;
@@ -101,12 +101,7 @@ fn filtered(
     scans: &SimulatedScans,
     params: &FilterParams,
 ) -> Result<Row> {
-    let prepared: Vec<PreparedScan> = scans
-        .views
-        .iter()
-        .enumerate()
-        .map(|(i, v)| PreparedScan::new(&v.scan).with_context(|| format!("view {i}")))
-        .collect::<Result<_>>()?;
+    let prepared = prepared(scans)?;
     let posed: Vec<(&PreparedScan, Pose)> =
         prepared.iter().zip(&scans.views).map(|(scan, view)| (scan, view.true_pose)).collect();
     let started = Instant::now();

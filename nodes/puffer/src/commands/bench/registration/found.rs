@@ -1,10 +1,11 @@
 //! Poses of simulated scans: ours, or those that another program wrote.
 
+use crate::commands::bench::prepared;
 use anyhow::{Context, Result, anyhow};
 use puffer_core::Progress;
 use puffer_core::geometry::{Pose, pose_from_rows};
 use puffer_core::register::{PairScan, PreparedScan, RegisterParams, Status, align_pair, register};
-use puffer_core::simulate::{SimulatedScans, SimulatedView};
+use puffer_core::simulate::SimulatedScans;
 use serde::Deserialize;
 use std::path::Path;
 use std::time::Instant;
@@ -39,10 +40,7 @@ pub(super) struct Prepared {
 impl Prepared {
     pub(super) fn new(scans: &SimulatedScans) -> Result<Prepared> {
         let started = Instant::now();
-        let view = |(i, v): (usize, &SimulatedView)| {
-            PreparedScan::new(&v.scan).with_context(|| format!("view {i}"))
-        };
-        let scans = scans.views.iter().enumerate().map(view).collect::<Result<_>>()?;
+        let scans = prepared(scans)?;
         Ok(Prepared { scans, seconds: started.elapsed().as_secs_f64() })
     }
 }
