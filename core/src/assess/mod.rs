@@ -10,23 +10,29 @@ mod distances;
 #[cfg(test)]
 mod filter_tests;
 mod filtering;
+mod perturb;
 mod poses;
 mod reference;
+mod returned;
 mod sample;
 mod stats;
 #[cfg(test)]
 mod tests;
 mod topology;
+mod trials;
 
 pub use align::{Alignment, align};
 pub use calibration::{Calibration, calibration};
 pub use distances::{Distances, RawDistances, Spread};
 pub use filtering::{FilterFigures, filter_figures};
+pub use perturb::{differences, perturbed};
 pub use poses::{PoseErrors, PosedHits, pair_error, pose_errors};
 pub use reference::{Nearest, Reference, distance_to_open_truth};
+pub use returned::{Reference as PosedReference, Returned};
 pub use sample::{Sample, sample_surface};
 pub use stats::quantile;
 pub use topology::{Topology, topology};
+pub use trials::{Trial, TrialKind, TrialScan, trial_scans, trials};
 
 use crate::geometry::{KdTree, Pose, Vec3};
 use crate::mesh::{Mesh, invariants};

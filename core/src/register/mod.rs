@@ -12,6 +12,7 @@ mod equations;
 mod factors;
 mod joint;
 mod pair;
+mod place;
 mod prepare;
 mod registrar;
 mod sample;
@@ -23,7 +24,7 @@ mod verdict;
 mod whiten;
 
 pub use align::{Kernel, Matching, Rejection, Selection, Weight};
-pub use pair::{PairScan, align_pair};
+pub use pair::{PairScan, align_pair, align_pair_within};
 pub use prepare::{PreparedScan, Unoriented};
 pub use registrar::Registrar;
 pub use variants::{Variant, variants};
@@ -88,6 +89,8 @@ crate::params! {
         information_share: f64 = 0.05, in [0.0001, 1.0];
         /// Corrections beyond this many standard deviations of the prior are deferred, then refused.
         max_correction: f64 = 3.0, in [0.5, 100.0];
+        /// Residuals larger than what noise explains by this factor are of surfaces that do not belong together.
+        max_residual: f64 = 3.0, in [1.0, 100.0];
         /// Whether all accepted scans are optimised together at the end.
         joint: bool = true;
         /// Passes of the joint optimisation at most, each with new correspondences.

@@ -1,10 +1,11 @@
 //! One scan onto another.
 
-use super::align::Map;
+use super::align::{Map, Prior};
+use super::place::place;
 use super::sample::Sample;
-use super::stages::place;
 use super::{PoseSigma, PreparedScan, RegisterParams, Verdict};
-use crate::geometry::Pose;
+use crate::geometry::{Mat6, Pose};
+use crate::{Error, Result};
 
 /// A scan made ready for [`align_pair`].
 pub struct PairScan {
@@ -31,5 +32,26 @@ pub fn align_pair(
     sigma: PoseSigma,
     params: &RegisterParams,
 ) -> (Pose, Verdict) {
-    place(&moving.sample, &fixed.map, guess, sigma, params)
+    place(&moving.sample, &fixed.map, &Prior::of(guess, sigma), params)
+}
+
+/// As [`align_pair`], where the uncertainty of the guess itself is known: the covariance of `xi` in
+/// `T_true = guess exp(xi)`, order x y z rx ry rz, moving sensor's frame, square metres and square radians.
+///
+/// # Errors
+/// [`Error::Input`] if the covariance has no positive inverse.
+pub fn align_pair_within(
+    moving: &PairScan,
+    fixed: &PairScan,
+    guess: &Pose,
+    covariance: &Mat6,
+    params: &RegisterParams,
+) -> Result<(Pose, Verdict)> {
+    let information = covariance.cholesky().map(|c| c.inverse()).ok_or_else(|| {
+        Error::input(
+            "the covariance of the guess is not positive definite: state how certain each axis is",
+        )
+    })?;
+    let prior = Prior { pose: *guess, information };
+    Ok(place(&moving.sample, &fixed.map, &prior, params))
 }

@@ -1,9 +1,11 @@
 //! Registration of scans as they come.
 
+use super::align::{Map, Prior};
+use super::place::place;
 use super::sample::Sample;
-use super::stages::{place, waiting};
+use super::stages::waiting;
 use super::verdict::{Status, Verdict};
-use super::{PoseSigma, PreparedScan, RegisterParams, Registration, align::Map, register_samples};
+use super::{PoseSigma, PreparedScan, RegisterParams, Registration, register_samples};
 use crate::geometry::Pose;
 use crate::{Progress, Result};
 
@@ -100,7 +102,8 @@ impl Registrar {
         let Some(map) = &mut self.map else { return false };
         self.tries[index] += 1;
         let sample = &self.samples[index];
-        let (pose, verdict) = place(sample, map, &self.robot[index], self.pose_sigma, &self.params);
+        let prior = Prior::of(&self.robot[index], self.pose_sigma);
+        let (pose, verdict) = place(sample, map, &prior, &self.params);
         let accepted = verdict.status == Status::Accepted;
         self.verdicts[index] = verdict;
         if accepted {

@@ -2,7 +2,8 @@
 
 use super::align::{Map, Rejection, Surface, boundary, select};
 use super::{PreparedScan, RegisterParams};
-use crate::geometry::{Aabb, Pose, Vec3, median};
+use crate::geometry::{Aabb, Mat6, Pose, Vec3, median, skew};
+use nalgebra::Matrix3x6;
 
 /// One scan made ready for registration, sensor frame.
 pub(crate) struct Sample {
@@ -66,11 +67,26 @@ impl Sample {
         map.insert(&surface, pose);
     }
 
+    /// Standard deviation of the points, along the axis that is least certain, for a pose of this information, metres.
+    pub(crate) fn moved_by(&self, information: &Mat6) -> f64 {
+        let Some(covariance) = information.try_inverse() else { return f64::INFINITY };
+        let stride = self.points.len().div_ceil(PROBES).max(1);
+        let probes = self.points.iter().step_by(stride).map(|p| {
+            let mut moves = Matrix3x6::zeros();
+            moves.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+            moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+            (moves * covariance * moves.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
+        });
+        median(probes.collect()).unwrap_or(0.0)
+    }
+
     /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
     pub(crate) fn reach(&self, noise: f64) -> f64 {
         (3.0 * self.target_spacing).max(4.0 * noise)
     }
 }
 
+/// Points that tell how far an uncertain pose moves a scan.
+const PROBES: usize = 64;
 /// Targets kept of a scan: at a tenth of a million, searches take longer and find nothing better.
 const TARGETS: usize = 40_000;

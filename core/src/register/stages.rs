@@ -1,9 +1,10 @@
 //! The two stages (Wiedemann 2014, §2.3.1): align each scan to the map, then try those put aside again.
 
-use super::align::{Map, Moving, Prior, Radius, align, correspondences};
+use super::align::{Map, Moving, Prior, correspondences};
+use super::place::place;
 use super::sample::Sample;
 use super::verdict::{Status, Verdict};
-use super::{Method, PoseSigma, RegisterParams, Registration};
+use super::{PoseSigma, RegisterParams, Registration};
 use crate::geometry::Pose;
 use crate::{Progress, Result};
 
@@ -78,7 +79,8 @@ pub(crate) fn place_rest(
         for (_, i) in order {
             progress.report("register", (accepted.len() + joined) as f64 / samples.len() as f64)?;
             tries[i] += 1;
-            let (pose, verdict) = place(&samples[i], &map, &robot[i], sigma, params);
+            let prior = Prior::of(&robot[i], sigma);
+            let (pose, verdict) = place(&samples[i], &map, &prior, params);
             let good = verdict.status == Status::Accepted;
             registration.verdicts[i] = verdict;
             if good {
@@ -96,32 +98,4 @@ pub(crate) fn place_rest(
         registration.verdicts[i].status = Status::Refused;
     }
     Ok(joined)
-}
-
-/// Aligns one scan to the map and judges the outcome.
-pub(crate) fn place(
-    sample: &Sample,
-    map: &Map,
-    robot: &Pose,
-    sigma: PoseSigma,
-    params: &RegisterParams,
-) -> (Pose, Verdict) {
-    // A scan's noise and the map's.
-    let noise = sample.noise * std::f64::consts::SQRT_2;
-    // The map stands where its first scan was believed to be: its error and the scan's add up.
-    let information = sigma.information() / 2.0;
-    let prior = Prior { pose: *robot, information };
-    let moving =
-        Moving { points: &sample.points, normals: &sample.normals, rays: &sample.rays, noise };
-    let radius = radius(sample, sigma, noise, params);
-    let alignment = align(&moving, map, &prior, radius, params);
-    let verdict = Verdict::of(&alignment, robot, &information, sample.points.len(), noise, params);
-    (alignment.pose, verdict)
-}
-
-fn radius(sample: &Sample, sigma: PoseSigma, noise: f64, params: &RegisterParams) -> Radius {
-    let end = sample.reach(noise);
-    let start = if params.radius > 0.0 { params.radius } else { sample.pose_reach(sigma).max(end) };
-    // The thesis's radius stays as it is.
-    Radius { start, end: if params.method == Method::Thesis { start } else { end.min(start) } }
 }

@@ -1,6 +1,6 @@
 //! What becomes of a scan.
 
-use super::align::Alignment;
+use super::align::{Alignment, Prior};
 use super::{Method, RegisterParams};
 use crate::geometry::{Mat6, Pose, Twist, log};
 use nalgebra::SymmetricEigen;
@@ -63,36 +63,43 @@ impl Verdict {
         }
     }
 
-    /// Judges an alignment of `sampled` points that started at `robot`.
+    /// Judges an alignment of `sampled` points.
     ///
-    /// `information` is that of the prior relative to the map, `expected` the residual that noise explains.
+    /// `prior` is what was believed of the pose relative to the map, `expected` the residual that noise explains.
     pub(crate) fn of(
         alignment: &Alignment,
-        robot: &Pose,
-        information: &Mat6,
+        prior: &Prior,
         sampled: usize,
         expected: f64,
         params: &RegisterParams,
     ) -> Verdict {
         let overlap = alignment.correspondences as f64 / sampled.max(1) as f64;
-        let problem = problem(alignment, robot, information, overlap, expected, params);
+        let free = free_directions(&alignment.information, &prior.information);
+        let problem = problem(alignment, prior, overlap, expected, params);
         Verdict {
             status: if problem.is_some() { Status::Deferred } else { Status::Accepted },
-            reason: problem.unwrap_or_else(|| "aligned".into()),
+            reason: problem.unwrap_or_else(|| aligned(free.len())),
             fitness: overlap * (expected / alignment.rmse.max(expected)).min(1.0),
             overlap,
             rmse: alignment.rmse,
             correspondences: alignment.correspondences,
-            covariance: inverse(&(alignment.information + information)),
-            free_directions: free_directions(&alignment.information, information),
+            covariance: inverse(&(alignment.information + prior.information)),
+            free_directions: free,
         }
+    }
+}
+
+fn aligned(free: usize) -> String {
+    match free {
+        0 => "aligned".into(),
+        1 => "aligned; one direction is left to the robot's pose".into(),
+        _ => format!("aligned; {free} directions are left to the robot's pose"),
     }
 }
 
 fn problem(
     alignment: &Alignment,
-    robot: &Pose,
-    information: &Mat6,
+    prior: &Prior,
     overlap: f64,
     expected: f64,
     params: &RegisterParams,
@@ -116,18 +123,10 @@ fn problem(
     if !alignment.converged {
         return Some(format!("did not converge in {} iterations", params.max_iterations));
     }
-    let xi = log(&(robot.inverse() * alignment.pose));
-    let mahalanobis = xi.dot(&(information * xi)).sqrt();
-    if mahalanobis > chi(params.max_correction) {
-        return Some(format!(
-            "correction of {:.1} mm and {:.2} degrees is beyond {} standard deviations of the robot's pose",
-            xi.fixed_rows::<3>(0).norm() * 1e3,
-            xi.fixed_rows::<3>(3).norm().to_degrees(),
-            params.max_correction
-        ));
+    if let Some(far) = correction(&alignment.pose, prior, params) {
+        return Some(far);
     }
-    // Three times what noise explains: two surfaces that do not belong together.
-    (alignment.rmse > 3.0 * expected).then(|| {
+    (alignment.rmse > params.max_residual * expected).then(|| {
         format!(
             "residual {:.2} mm where noise explains {:.2} mm",
             alignment.rmse * 1e3,
@@ -136,9 +135,23 @@ fn problem(
     })
 }
 
+/// What is wrong with a pose that lies too far from where the prior believes it.
+pub(crate) fn correction(pose: &Pose, prior: &Prior, params: &RegisterParams) -> Option<String> {
+    let xi = log(&(prior.pose.inverse() * pose));
+    let mahalanobis = xi.dot(&(prior.information * xi)).sqrt();
+    (mahalanobis > chi(params.max_correction)).then(|| {
+        format!(
+            "correction of {:.1} mm and {:.2} degrees is beyond {} standard deviations of the robot's pose",
+            xi.fixed_rows::<3>(0).norm() * 1e3,
+            xi.fixed_rows::<3>(3).norm().to_degrees(),
+            params.max_correction
+        )
+    })
+}
+
 /// The radius in six dimensions that holds the probability which `sigmas` hold in one
 /// (Wilson & Hilferty 1931: chi-square by a normal deviate); 3 gives 4.5.
-fn chi(sigmas: f64) -> f64 {
+pub(crate) fn chi(sigmas: f64) -> f64 {
     // The two-sided bound of one dimension is reached one-sidedly at nearly the same deviate.
     let z = sigmas - 0.22;
     let n = 6.0_f64;

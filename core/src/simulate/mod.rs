@@ -19,6 +19,7 @@ mod views;
 pub use cell::{Cell, sensor_of};
 pub use labels::{FLYING, GOOD, OUTLIER, SURROUNDINGS};
 pub use noise::NoiseFamily;
+pub(crate) use noise::direction;
 pub use truth::{TrueNoise, add_outliers, outlier_share};
 pub use views::view_poses;
 

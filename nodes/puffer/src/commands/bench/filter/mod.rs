@@ -25,7 +25,7 @@ use std::time::Instant;
 #[derive(Args)]
 pub struct Filter {
     /// Objects by name, or closed mesh files in metres
-    #[arg(long, value_delimiter = ',', default_value = "filter,coffee,mug,spot,rockerarm")]
+    #[arg(long, value_delimiter = ',', default_value = "filter,coffee,mug")]
     objects: Vec<String>,
     /// Noise families
     #[arg(long, value_delimiter = ',', default_value = "P1,P3")]

@@ -2,7 +2,9 @@
 
 mod found;
 mod growth;
+mod returned;
 mod row;
+mod verdicts;
 
 use super::family;
 use crate::commands::simulate::{truth_of, write_folder};
@@ -46,6 +48,12 @@ pub struct Registration {
     /// Measures how long scans take that come one by one, the more of them there are; try it with --views 100
     #[arg(long, conflicts_with = "keep")]
     one_by_one: bool,
+    /// Instead: N trials of verdicts on pairs of scans, with each object and noise family
+    #[arg(long, value_name = "N", conflicts_with_all = ["keep", "json", "variants", "one_by_one"])]
+    verdicts: Option<usize>,
+    /// Instead: whether the scans of a folder or *.conf file, moved off their poses, come back to them
+    #[arg(long, value_name = "INPUT", conflicts_with_all = ["keep", "json", "variants", "one_by_one", "verdicts"])]
+    returned: Option<PathBuf>,
     #[command(flatten)]
     parameters: ParameterArgs,
     /// Print a JSON object a case instead of a table
@@ -70,6 +78,14 @@ impl Case {
 impl Registration {
     pub(super) fn run(&self) -> Result<()> {
         let params = self.parameters.load()?.register;
+        if let Some(input) = &self.returned {
+            return returned::run(input, &self.seeds, &params);
+        }
+        if let Some(count) = self.verdicts {
+            let seed = self.seeds.first().copied().unwrap_or(1);
+            let size = (self.views, count, seed);
+            return verdicts::run(&self.objects, &self.noise, size, &params);
+        }
         let families: Vec<NoiseFamily> =
             self.noise.iter().map(|word| family(word)).collect::<Result<_>>()?;
         let several = self.variants || self.one_by_one;
