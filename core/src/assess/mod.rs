@@ -11,6 +11,8 @@ mod distances;
 mod filter_tests;
 mod filtering;
 mod perturb;
+#[cfg(test)]
+mod pose_tests;
 mod poses;
 mod reference;
 mod returned;

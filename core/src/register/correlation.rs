@@ -51,6 +51,13 @@ impl Correlation {
         Correlogram::total(&sums).fit(spacing)
     }
 
+    /// Independent measurements for each one, where they lie `spacing` (metres) apart over a plane: 1 over the sum of
+    /// rho over all neighbours (Cressie 1993, §1.3).
+    pub(crate) fn independent_share(&self, spacing: f64) -> f64 {
+        let alike = self.share * std::f64::consts::PI * (self.length / spacing).powi(2);
+        1.0 / (1.0 + alike)
+    }
+
     /// rho at a distance, metres.
     pub(crate) fn at(&self, distance: f64) -> f64 {
         if distance == 0.0 { 1.0 } else { self.share * (-(distance / self.length).powi(2)).exp() }

@@ -30,6 +30,13 @@ pub fn tukey(r: f64) -> f64 {
     if u.abs() >= 1.0 { 0.0 } else { (1.0 - u * u).powi(2) }
 }
 
+/// What Tukey's biweight minimises, for a residual `r` in units of its standard deviation: `r^2 / 2` for small ones, and
+/// 4.685^2 / 6 for all beyond 4.685.
+pub fn tukey_loss(r: f64) -> f64 {
+    let u = (r / 4.685).abs().min(1.0);
+    4.685 * 4.685 / 6.0 * (1.0 - (1.0 - u * u).powi(3))
+}
+
 /// The variance of a point along its surface's normal beside that within the surface (Segal, Haehnel & Thrun 2009, §III.B).
 const FLATNESS: f64 = 1e-3;
 

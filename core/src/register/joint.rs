@@ -27,11 +27,21 @@ const RELAXATION: f64 = 1.7;
 /// Surfels along the diagonal of the largest scan at most: finer ones cost time and tell nothing new.
 const FINEST: f64 = 64.0;
 
+/// How far from the optimum the poses may still be.
+#[derive(Clone, Copy)]
+pub(crate) enum Start {
+    /// By the errors that scans had when they were placed one by one.
+    Coarse,
+    /// Only a few have moved.
+    Fine,
+}
+
 /// Moves the poses of all accepted scans to their joint optimum.
 pub(crate) fn optimise(
     samples: &[Sample],
     robot: &[Pose],
     registration: &mut Registration,
+    start: Start,
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<()> {
@@ -43,7 +53,10 @@ pub(crate) fn optimise(
     let prior = registration.pose_sigma.information();
     let scans: Vec<&Sample> = members.iter().map(|&i| &samples[i]).collect();
     let end = Scale::finest(&scans);
-    let mut now = end.coarser(4.0);
+    let mut now = match start {
+        Start::Coarse => end.coarser(4.0),
+        Start::Fine => end,
+    };
     let mut hessian = DMatrix::zeros(0, 0);
     for pass in 0..params.joint_iterations {
         progress.report("optimise", pass as f64 / params.joint_iterations as f64)?;

@@ -9,12 +9,15 @@
 mod align;
 mod correlation;
 mod equations;
+mod evidence;
 mod factors;
 mod joint;
 mod pair;
 mod place;
 mod prepare;
 mod registrar;
+mod revise;
+mod rivals;
 mod sample;
 mod sigma;
 mod stages;
@@ -33,6 +36,8 @@ pub use verdict::{Status, Verdict};
 use crate::geometry::Pose;
 use crate::scans::PoseSigma;
 use crate::{Error, Progress, Result};
+use joint::Start;
+use revise::revise;
 use sample::Sample;
 
 crate::choice! {
@@ -90,7 +95,7 @@ crate::params! {
         /// Corrections beyond this many standard deviations of the prior are deferred, then refused.
         max_correction: f64 = 3.0, in [0.5, 100.0];
         /// Residuals larger than what noise explains by this factor are of surfaces that do not belong together.
-        max_residual: f64 = 3.0, in [1.0, 100.0];
+        max_residual: f64 = 2.2, in [1.0, 100.0];
         /// Whether all accepted scans are optimised together at the end.
         joint: bool = true;
         /// Passes of the joint optimisation at most, each with new correspondences.
@@ -164,16 +169,19 @@ fn register_samples(
     let pose_sigma = pose_sigma.unwrap_or_else(|| sigma::estimate(samples, robot));
     let mut registration = stages::two_stages(samples, robot, pose_sigma, params, progress)?;
     if params.joint && params.method != Method::Thesis {
-        joint::optimise(samples, robot, &mut registration, params, progress)?;
+        joint::optimise(samples, robot, &mut registration, Start::Coarse, params, progress)?;
         // The first scans' errors had moved the map away from the priors. It stands right now: what was refused
-        // for that reason has another chance.
-        if stages::place_rest(samples, robot, &mut registration, params, progress)? > 0 {
-            joint::optimise(samples, robot, &mut registration, params, progress)?;
+        // for that reason has another chance, and what came to rest wrongly.
+        let joined = stages::place_rest(samples, robot, &mut registration, params, progress)?;
+        if revise(samples, robot, &mut registration, params) + joined > 0 {
+            joint::optimise(samples, robot, &mut registration, Start::Fine, params, progress)?;
         }
     }
     registration.residual = joint::residual(samples, &registration, params);
     Ok(registration)
 }
 
+#[cfg(test)]
+mod symmetric_tests;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,10 @@
-//! One scan placed against the map, and judged.
+//! One scan placed against the map, and judged: what is wrong is found out here, before a scan joins the model.
 
-use super::align::{Map, Moving, Prior, Radius, align};
+use super::align::{Alignment, Map, Prior, Radius, align};
+use super::evidence::Evidence;
+use super::rivals::Rivals;
 use super::sample::Sample;
-use super::verdict::Verdict;
+use super::verdict::{Status, Verdict};
 use super::{Method, PoseSigma, RegisterParams};
 use crate::geometry::{Mat6, Pose};
 
@@ -23,12 +25,30 @@ pub(crate) fn place(
 ) -> (Pose, Verdict) {
     // A scan's noise and the map's.
     let noise = sample.noise * std::f64::consts::SQRT_2;
-    let moving =
-        Moving { points: &sample.points, normals: &sample.normals, rays: &sample.rays, noise };
+    let moving = sample.moving(noise);
     let radius = radius(sample, &prior.information, noise, params);
-    let found = align(&moving, map, prior, radius, params);
-    let verdict = Verdict::of(&found, prior, sample.points.len(), noise, params);
-    (found.pose, verdict)
+    let judge = |found: &Alignment| Verdict::of(found, prior, sample.points.len(), noise, params);
+    let mut found = align(&moving, map, prior, radius, params);
+    if params.method == Method::Thesis {
+        return (found.pose, judge(&found));
+    }
+    let mut pose = found.pose;
+    if let Some(evidence) = Evidence::at(sample, map, &pose, radius.end, params) {
+        pose = evidence.given_back(&pose, prior);
+        found.information = evidence.information;
+    }
+    // Asked of the pose that was found: an alignment that was drawn off by far is none.
+    let verdict = judge(&found);
+    if verdict.status != Status::Accepted {
+        return (pose, verdict);
+    }
+    let rivals = Rivals { sample, map, prior, radius, params };
+    let ambiguous = rivals.of(&pose, &verdict.covariance).map(|rival| {
+        let apart = sample.displacement(&pose, &rival.pose) * 1e3;
+        let how = if rival.better { "better" } else { "as well" };
+        format!("ambiguous: a pose {apart:.1} mm away fits {how}")
+    });
+    (pose, verdict.unless(ambiguous))
 }
 
 fn radius(sample: &Sample, prior: &Mat6, noise: f64, params: &RegisterParams) -> Radius {

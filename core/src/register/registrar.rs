@@ -9,6 +9,9 @@ use super::{PoseSigma, PreparedScan, RegisterParams, Registration, register_samp
 use crate::geometry::Pose;
 use crate::{Progress, Result};
 
+/// Scans that wait which a new one is tried with, the latest first.
+const PARTNERS: usize = 4;
+
 /// Takes scans one by one: each is aligned to those accepted before it, and those put aside are tried again
 /// whenever the map has grown (Wiedemann 2014, §2.3.1).
 pub struct Registrar {
@@ -78,8 +81,39 @@ impl Registrar {
         let mut changed = vec![index];
         if self.try_to_place(index) {
             changed.extend(self.retry());
+        } else if let Some(partner) = self.pair_up(index) {
+            changed.push(partner);
+            changed.extend(self.retry());
         }
         changed
+    }
+
+    /// Looks for a scan that waits as `index` does, and which it fits: the two join together, where the robot puts the
+    /// one that came first. Otherwise nothing could be built on a first scan that nothing else overlaps with.
+    fn pair_up(&mut self, index: usize) -> Option<usize> {
+        let prior = Prior::of(&self.robot[index], self.pose_sigma);
+        let partner = (0..index).rev().filter(|&i| self.verdicts[i].status == Status::Deferred);
+        let (partner, pose, verdict) = partner.take(PARTNERS).find_map(|i| {
+            let mut map = Map::new(self.samples[0].target_spacing);
+            self.samples[i].add_to(&mut map, &self.robot[i]);
+            let (pose, verdict) = place(&self.samples[index], &map, &prior, &self.params);
+            (verdict.status == Status::Accepted).then_some((i, pose, verdict))
+        })?;
+        let alone = Verdict {
+            reason: format!("stands where the robot put it; scan {index} is aligned to it"),
+            ..Verdict::first(&self.pose_sigma.information())
+        };
+        self.accept(partner, self.robot[partner], alone);
+        self.accept(index, pose, verdict);
+        Some(partner)
+    }
+
+    fn accept(&mut self, index: usize, pose: Pose, verdict: Verdict) {
+        if let Some(map) = &mut self.map {
+            self.samples[index].add_to(map, &pose);
+        }
+        self.poses[index] = pose;
+        self.verdicts[index] = verdict;
     }
 
     /// Tries all that were put aside until none can be placed.
@@ -99,16 +133,15 @@ impl Registrar {
     }
 
     fn try_to_place(&mut self, index: usize) -> bool {
-        let Some(map) = &mut self.map else { return false };
+        let Some(map) = &self.map else { return false };
         self.tries[index] += 1;
-        let sample = &self.samples[index];
         let prior = Prior::of(&self.robot[index], self.pose_sigma);
-        let (pose, verdict) = place(sample, map, &prior, &self.params);
+        let (pose, verdict) = place(&self.samples[index], map, &prior, &self.params);
         let accepted = verdict.status == Status::Accepted;
-        self.verdicts[index] = verdict;
         if accepted {
-            self.poses[index] = pose;
-            sample.add_to(map, &pose);
+            self.accept(index, pose, verdict);
+        } else {
+            self.verdicts[index] = verdict;
         }
         accepted
     }

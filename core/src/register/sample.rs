@@ -1,6 +1,6 @@
 //! One scan made ready for registration.
 
-use super::align::{Map, Rejection, Surface, boundary, select};
+use super::align::{Map, Moving, Rejection, Surface, boundary, select};
 use super::{PreparedScan, RegisterParams};
 use crate::geometry::{Aabb, Mat6, Pose, Vec3, median, skew};
 use nalgebra::Matrix3x6;
@@ -57,6 +57,17 @@ impl Sample {
         }
     }
 
+    /// The points as what is aligned, with residuals of deviation `noise` (metres).
+    pub(crate) fn moving(&self, noise: f64) -> Moving<'_> {
+        Moving { points: &self.points, normals: &self.normals, rays: &self.rays, noise }
+    }
+
+    /// Every `stride`-th of the points.
+    pub(crate) fn every(&self, stride: usize) -> Thinned {
+        let take = |of: &[Vec3]| of.iter().copied().step_by(stride).collect();
+        Thinned { points: take(&self.points), normals: take(&self.normals), rays: take(&self.rays) }
+    }
+
     /// Adds the targets, seen from `pose`, to the map.
     pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
         let surface = Surface {
@@ -80,9 +91,36 @@ impl Sample {
         median(probes.collect()).unwrap_or(0.0)
     }
 
+    /// Root mean square distance of the points between two poses, metres.
+    pub(crate) fn displacement(&self, a: &Pose, b: &Pose) -> f64 {
+        let stride = self.points.len().div_ceil(PROBES).max(1);
+        let place = |pose: &Pose, p: &Vec3| pose.rotation * p + pose.translation.vector;
+        let squares: Vec<f64> = self
+            .points
+            .iter()
+            .step_by(stride)
+            .map(|p| (place(a, p) - place(b, p)).norm_squared())
+            .collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    }
+
     /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
     pub(crate) fn reach(&self, noise: f64) -> f64 {
         (3.0 * self.target_spacing).max(4.0 * noise)
+    }
+}
+
+/// Some of a scan's points.
+pub(crate) struct Thinned {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    rays: Vec<Vec3>,
+}
+
+impl Thinned {
+    /// As what is aligned, with residuals of deviation `noise` (metres).
+    pub(crate) fn moving(&self, noise: f64) -> Moving<'_> {
+        Moving { points: &self.points, normals: &self.normals, rays: &self.rays, noise }
     }
 }
 

@@ -1,12 +1,13 @@
 //! The two stages (Wiedemann 2014, §2.3.1): align each scan to the map, then try those put aside again.
 
-use super::align::{Map, Moving, Prior, correspondences};
+use super::align::{Map, Prior, correspondences};
 use super::place::place;
 use super::sample::Sample;
 use super::verdict::{Status, Verdict};
-use super::{PoseSigma, RegisterParams, Registration};
+use super::{Method, PoseSigma, RegisterParams, Registration};
 use crate::geometry::Pose;
 use crate::{Progress, Result};
+use rayon::prelude::*;
 
 /// Points that tell how much of a scan overlaps: every so many.
 const OVERLAP_STRIDE: usize = 8;
@@ -20,11 +21,8 @@ impl Sample {
     /// Sampled points near the map, normals alike, if the robot's pose is right.
     fn overlap(&self, map: &Map, robot: &Pose, sigma: PoseSigma, params: &RegisterParams) -> usize {
         let reach = self.pose_reach(sigma).max(self.target_spacing);
-        let points: Vec<_> = self.points.iter().copied().step_by(OVERLAP_STRIDE).collect();
-        let normals: Vec<_> = self.normals.iter().copied().step_by(OVERLAP_STRIDE).collect();
-        let rays: Vec<_> = self.rays.iter().copied().step_by(OVERLAP_STRIDE).collect();
-        let moving = Moving { points: &points, normals: &normals, rays: &rays, noise: self.noise };
-        correspondences(&moving, map, robot, reach, params).len()
+        let thin = self.every(OVERLAP_STRIDE);
+        correspondences(&thin.moving(self.noise), map, robot, reach, params).len()
     }
 }
 
@@ -33,7 +31,8 @@ pub(crate) fn waiting(sigma: PoseSigma) -> Verdict {
     Verdict { status: Status::Deferred, ..Verdict::first(&sigma.information()) }
 }
 
-/// Aligns all scans to the first and to those accepted before them; those that no round could place are refused
+/// Aligns all scans to the first (where few can join it, to the one most others overlap with) and to those accepted
+/// before them; those that no round could place are refused
 /// and keep the robot's pose.
 pub(crate) fn two_stages(
     samples: &[Sample],
@@ -42,12 +41,38 @@ pub(crate) fn two_stages(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let mut verdicts = vec![waiting(sigma); samples.len()];
-    verdicts[0].status = Status::Accepted;
-    let mut registration =
-        Registration { poses: robot.to_vec(), verdicts, pose_sigma: sigma, residual: f64::NAN };
-    place_rest(samples, robot, &mut registration, params, progress)?;
-    Ok(registration)
+    let from = |start: usize| -> Result<(usize, Registration)> {
+        let mut verdicts = vec![waiting(sigma); samples.len()];
+        verdicts[start].status = Status::Accepted;
+        let mut registration =
+            Registration { poses: robot.to_vec(), verdicts, pose_sigma: sigma, residual: f64::NAN };
+        let joined = place_rest(samples, robot, &mut registration, params, progress)?;
+        Ok((joined, registration))
+    };
+    let (joined, registration) = from(0)?;
+    if params.method == Method::Thesis || 2 * (joined + 1) >= samples.len() {
+        return Ok(registration);
+    }
+    // The first scan shares too little with the others for them to join it.
+    let (more, other) = from(most_central(samples, robot, sigma, params))?;
+    Ok(if more > joined { other } else { registration })
+}
+
+/// The scan that the others overlap with most, if the robot's poses are right.
+fn most_central(
+    samples: &[Sample],
+    robot: &[Pose],
+    sigma: PoseSigma,
+    params: &RegisterParams,
+) -> usize {
+    let shared = |center: usize| -> usize {
+        let mut map = Map::new(samples[0].target_spacing);
+        samples[center].add_to(&mut map, &robot[center]);
+        let others = (0..samples.len()).filter(|&i| i != center);
+        others.map(|i| samples[i].overlap(&map, &robot[i], sigma, params)).sum()
+    };
+    let order = (0..samples.len()).into_par_iter().map(|i| (shared(i), std::cmp::Reverse(i)));
+    order.max().map_or(0, |(_, std::cmp::Reverse(i))| i)
 }
 
 /// Tries to place all scans that are not accepted, each time the one that overlaps most with the map; one that fails

@@ -238,3 +238,64 @@ fn a_pair_comes_together_whatever_the_order() {
         assert!(after < 0.5 * before, "{moving} to {fixed}: {before} to {after}");
     }
 }
+
+/// The first of the scans is of something else.
+fn with_a_stranger_first() -> Case {
+    let mut case = case(SIGMA);
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut point = || [0, 1, 2].map(|k| rng.random_range(-0.05..0.05_f32) + [0.0, 0.0, 0.3][k]);
+    let points = (0..8000).map(|_| point()).collect();
+    case.scans[0] = PreparedScan::new(&Scan { points, ..Scan::default() }).unwrap();
+    case
+}
+
+#[test]
+fn a_first_scan_that_nothing_overlaps_with_does_not_stop_the_others() {
+    let case = with_a_stranger_first();
+    let params = RegisterParams::default();
+    let progress = Progress::silent();
+    let found = register(&case.scans, &case.robot, Some(SIGMA), &params, &progress).unwrap();
+    assert_eq!(found.verdicts[0].status, Status::Refused);
+    for verdict in &found.verdicts[1..] {
+        assert_eq!(verdict.status, Status::Accepted, "{}", verdict.reason);
+    }
+    let off = error(&found.poses[1..], &case.truth[1..]);
+    assert!(off < 5e-4, "{off}");
+}
+
+#[test]
+fn scans_that_wait_and_fit_each_other_join_together() {
+    let case = with_a_stranger_first();
+    let mut registrar = Registrar::new(SIGMA, RegisterParams::default());
+    registrar.add(&case.scans[0], &case.robot[0]);
+    assert_eq!(registrar.add(&case.scans[1], &case.robot[1]), [1]);
+    assert_eq!(registrar.verdict(1).status, Status::Deferred);
+    assert_eq!(registrar.add(&case.scans[2], &case.robot[2]), [2, 1]);
+    for i in [1, 2] {
+        assert_eq!(registrar.verdict(i).status, Status::Accepted);
+    }
+    assert_eq!(registrar.pose(1), case.robot[1]);
+    let between = |poses: [&Pose; 2]| poses[0].inverse() * poses[1];
+    let (found, truth) = (
+        between([&registrar.pose(1), &registrar.pose(2)]),
+        between([&case.truth[1], &case.truth[2]]),
+    );
+    assert!(log(&(truth.inverse() * found)).norm() < 5e-3, "{found} {truth}");
+}
+
+#[test]
+fn a_scan_at_rest_in_the_wrong_place_is_moved_and_no_other() {
+    let case = case(SIGMA);
+    let params = RegisterParams::default();
+    let samples: Vec<Sample> = case.scans.iter().map(|s| Sample::new(s, &params)).collect();
+    let mut registration = Registration::exact(&case.scans, &case.truth);
+    registration.pose_sigma = SIGMA;
+    for verdict in &mut registration.verdicts {
+        verdict.free_directions = vec![Twist::x()];
+    }
+    registration.poses[3] *= exp(&Twist::new(0.01, -0.008, 0.0, 0.03, 0.0, 0.02));
+    assert_eq!(revise(&samples, &case.robot, &mut registration, &params), 1);
+    let off = log(&(registration.poses[3].inverse() * case.truth[3]));
+    assert!(off.norm() < 5e-3, "{off}");
+    assert_eq!(registration.poses[2], case.truth[2]);
+}

@@ -53,7 +53,7 @@ impl Verdict {
     pub(crate) fn first(prior_information: &Mat6) -> Verdict {
         Verdict {
             status: Status::Accepted,
-            reason: "first scan: defines the map".into(),
+            reason: "defines the map that others are aligned to".into(),
             fitness: 1.0,
             overlap: 1.0,
             rmse: 0.0,
@@ -85,6 +85,16 @@ impl Verdict {
             correspondences: alignment.correspondences,
             covariance: inverse(&(alignment.information + prior.information)),
             free_directions: free,
+        }
+    }
+}
+
+impl Verdict {
+    /// The same alignment, but put aside if there is a `problem`.
+    pub(crate) fn unless(self, problem: Option<String>) -> Verdict {
+        match problem {
+            Some(reason) => Verdict { status: Status::Deferred, reason, ..self },
+            None => self,
         }
     }
 }
