@@ -17,8 +17,8 @@ impl PairScan {
     /// Makes a scan ready.
     pub fn new(scan: &PreparedScan, params: &RegisterParams) -> PairScan {
         let sample = Sample::new(scan, params);
-        let mut map = Map::new(sample.target_spacing);
-        sample.add_to(&mut map, &Pose::identity());
+        let here = Pose::identity();
+        let map = Sample::map_of(std::iter::once((&sample, &here)), sample.target_spacing);
         PairScan { sample, map }
     }
 }

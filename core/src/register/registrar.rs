@@ -71,9 +71,8 @@ impl Registrar {
         self.verdicts.push(waiting(self.pose_sigma));
         if self.map.is_none() {
             self.verdicts[index].status = Status::Accepted;
-            let mut map = Map::new(sample.target_spacing);
-            sample.add_to(&mut map, robot);
-            self.map = Some(map);
+            let alone = std::iter::once((&sample, robot));
+            self.map = Some(Sample::map_of(alone, sample.target_spacing));
             self.samples.push(sample);
             return vec![index];
         }
@@ -94,8 +93,8 @@ impl Registrar {
         let prior = Prior::of(&self.robot[index], self.pose_sigma);
         let partner = (0..index).rev().filter(|&i| self.verdicts[i].status == Status::Deferred);
         let (partner, pose, verdict) = partner.take(PARTNERS).find_map(|i| {
-            let mut map = Map::new(self.samples[0].target_spacing);
-            self.samples[i].add_to(&mut map, &self.robot[i]);
+            let alone = std::iter::once((&self.samples[i], &self.robot[i]));
+            let map = Sample::map_of(alone, self.samples[0].target_spacing);
             let (pose, verdict) = place(&self.samples[index], &map, &prior, &self.params);
             (verdict.status == Status::Accepted).then_some((i, pose, verdict))
         })?;
@@ -169,12 +168,9 @@ impl Registrar {
         }
         self.poses.clone_from(&registration.poses);
         self.verdicts.clone_from(&registration.verdicts);
-        let mut map = Map::new(self.samples[0].target_spacing);
-        for (i, sample) in self.samples.iter().enumerate() {
-            if self.verdicts[i].status == Status::Accepted {
-                sample.add_to(&mut map, &self.poses[i]);
-            }
-        }
-        self.map = Some(map);
+        let accepted = self.verdicts.iter().map(|verdict| verdict.status == Status::Accepted);
+        let scans = self.samples.iter().zip(&self.poses).zip(accepted);
+        let placed = scans.filter_map(|(placed, accepted)| accepted.then_some(placed));
+        self.map = Some(Sample::map_of(placed, self.samples[0].target_spacing));
     }
 }

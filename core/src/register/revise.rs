@@ -27,6 +27,8 @@ use rayon::prelude::*;
 const STARTS: usize = 10;
 /// Every so many of a scan's points look for minima.
 const STRIDE: usize = 4;
+/// Iterations that show to which minimum a start leads.
+const ROUGHLY: usize = 10;
 /// A pose must be better by so much in (1), a factor of 3000 in probability: the map's own noise makes minima.
 const CLEARLY: f64 = 8.0;
 
@@ -43,10 +45,9 @@ pub(crate) fn revise(
     let now: &Registration = registration;
     let open = |&&i: &&usize| !now.verdicts[i].free_directions.is_empty();
     let look = |&own: &usize| -> Option<(usize, Pose)> {
-        let mut map = Map::new(samples[0].target_spacing);
-        for &i in members.iter().filter(|&&i| i != own) {
-            samples[i].add_to(&mut map, &now.poses[i]);
-        }
+        let others = members.iter().filter(|&&i| i != own);
+        let placed = others.map(|&i| (&samples[i], &now.poses[i]));
+        let map = Sample::map_of(placed, samples[0].target_spacing);
         let prior = Prior { pose: robot[own], information: now.pose_sigma.information() };
         let look = Look { sample: &samples[own], map: &map, prior, params };
         look.better_than(&now.poses[own]).map(|pose| (own, pose))
@@ -72,14 +73,14 @@ impl Look<'_> {
     fn better_than(&self, here: &Pose) -> Option<Pose> {
         let thin = self.sample.every(STRIDE);
         let some = thin.moving(self.noise());
-        let tried = self.starts().into_iter().map(|start| self.at_rest(&some, &start));
+        let tried = self.starts().into_iter().map(|start| self.at_rest(&some, &start, ROUGHLY));
         let (cost, best) =
             tried.map(|pose| (self.cost(&some, &pose), pose)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         if cost > self.cost(&some, here) {
             return None;
         }
         let whole = self.sample.moving(self.noise());
-        let pose = self.at_rest(&whole, &best);
+        let pose = self.at_rest(&whole, &best, self.params.max_iterations);
         (self.cost(&whole, &pose) < self.cost(&whole, here) - CLEARLY).then_some(pose)
     }
 
@@ -95,12 +96,13 @@ impl Look<'_> {
         std::iter::once(self.prior.pose).chain(drawn).collect()
     }
 
-    /// Where the points come to rest from `start`, held loosely there.
-    fn at_rest(&self, moving: &Moving, start: &Pose) -> Pose {
+    /// Where the points come to rest from `start`, held loosely there, after some `iterations` at most.
+    fn at_rest(&self, moving: &Moving, start: &Pose, iterations: usize) -> Pose {
         let end = self.sample.reach(self.noise());
         let radius = Radius { start: 2.0 * end, end };
         let loose = Prior { pose: *start, information: self.prior.information / 4.0 };
-        align(moving, self.map, &loose, radius, self.params).pose
+        let params = RegisterParams { max_iterations: iterations, ..self.params.clone() };
+        align(moving, self.map, &loose, radius, &params).pose
     }
 
     /// (1) at a pose; those of `moving` count for all points of the scan.

@@ -68,14 +68,25 @@ impl Sample {
         Thinned { points: take(&self.points), normals: take(&self.normals), rays: take(&self.rays) }
     }
 
+    /// The map of the targets of `scans`, each seen from its pose.
+    pub(crate) fn map_of<'a>(
+        scans: impl Iterator<Item = (&'a Sample, &'a Pose)>,
+        voxel: f64,
+    ) -> Map {
+        Map::of(scans.map(|(sample, pose)| (sample.surface(), pose)), voxel)
+    }
+
     /// Adds the targets, seen from `pose`, to the map.
     pub(crate) fn add_to(&self, map: &mut Map, pose: &Pose) {
-        let surface = Surface {
+        map.insert(&self.surface(), pose);
+    }
+
+    fn surface(&self) -> Surface<'_> {
+        Surface {
             points: &self.targets,
             normals: &self.target_normals,
             boundary: &self.target_boundary,
-        };
-        map.insert(&surface, pose);
+        }
     }
 
     /// Standard deviation of the points, along the axis that is least certain, for a pose of this information, metres.

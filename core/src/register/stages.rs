@@ -66,8 +66,8 @@ fn most_central(
     params: &RegisterParams,
 ) -> usize {
     let shared = |center: usize| -> usize {
-        let mut map = Map::new(samples[0].target_spacing);
-        samples[center].add_to(&mut map, &robot[center]);
+        let alone = std::iter::once((&samples[center], &robot[center]));
+        let map = Sample::map_of(alone, samples[0].target_spacing);
         let others = (0..samples.len()).filter(|&i| i != center);
         others.map(|i| samples[i].overlap(&map, &robot[i], sigma, params)).sum()
     };
@@ -87,10 +87,8 @@ pub(crate) fn place_rest(
     let (accepted, mut waiting): (Vec<usize>, Vec<usize>) =
         (0..samples.len()).partition(|&i| registration.verdicts[i].status == Status::Accepted);
     let sigma = registration.pose_sigma;
-    let mut map = Map::new(samples[0].target_spacing);
-    for &i in &accepted {
-        samples[i].add_to(&mut map, &registration.poses[i]);
-    }
+    let placed = accepted.iter().map(|&i| (&samples[i], &registration.poses[i]));
+    let mut map = Sample::map_of(placed, samples[0].target_spacing);
     let mut tries = vec![0; samples.len()];
     let mut joined = 0;
     loop {

@@ -55,9 +55,32 @@ impl Map {
         self.voxel
     }
 
+    /// The map of surfaces (sensor frame), each seen from its pose; the tree is built once.
+    pub(crate) fn of<'a>(
+        surfaces: impl Iterator<Item = (Surface<'a>, &'a Pose)>,
+        voxel: f64,
+    ) -> Map {
+        let mut map = Map::new(voxel);
+        for (surface, pose) in surfaces {
+            map.take(&surface, pose);
+        }
+        map.tree = KdTree::new(&map.points);
+        map
+    }
+
     /// Adds oriented points (sensor frame) seen from `pose`. Returns how many points were built into the tree.
     pub(crate) fn insert(&mut self, surface: &Surface, pose: &Pose) -> usize {
         let known = self.points.len();
+        self.take(surface, pose);
+        if self.points.len() == known {
+            return 0;
+        }
+        self.tree = KdTree::new(&self.points);
+        self.points.len()
+    }
+
+    /// Adds points that the tree does not know yet.
+    fn take(&mut self, surface: &Surface, pose: &Pose) {
         for (i, (p, n)) in surface.points.iter().zip(surface.normals).enumerate() {
             let (point, normal) = (pose.rotation * p + pose.translation.vector, pose.rotation * n);
             let boundary = surface.boundary.get(i).copied().unwrap_or(false);
@@ -73,11 +96,6 @@ impl Map {
                 self.boundary[index as usize] &= boundary;
             }
         }
-        if self.points.len() == known {
-            return 0;
-        }
-        self.tree = KdTree::new(&self.points);
-        self.points.len()
     }
 
     /// The nearest point within `radius` (metres) of `query` (object frame).
