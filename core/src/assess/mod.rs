@@ -30,7 +30,7 @@ pub use filtering::{FilterFigures, filter_figures};
 pub use perturb::{differences, perturbed};
 pub use poses::{PoseErrors, PosedHits, pair_error, pose_errors};
 pub use reference::{Nearest, Reference, distance_to_open_truth};
-pub use returned::{Reference as PosedReference, Returned};
+pub use returned::{PosedReference, Returned};
 pub use sample::{Sample, sample_surface};
 pub use stats::quantile;
 pub use topology::{Topology, topology};

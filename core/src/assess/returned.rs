@@ -8,8 +8,8 @@ use crate::{Error, Progress, Result};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The scans and their reference poses.
-pub struct Reference {
+/// Scans and their reference poses.
+pub struct PosedReference {
     scans: Vec<PreparedScan>,
     poses: Vec<Pose>,
     /// Some points of each scan, sensor frame, metres, and their mean.
@@ -31,12 +31,12 @@ pub struct Returned {
 /// Points of a scan whose mean and common fit are looked at.
 const POINTS: usize = 2000;
 
-impl Reference {
+impl PosedReference {
     /// The scans of `set` with its poses as reference.
     ///
     /// # Errors
     /// As [`PreparedScan::new`].
-    pub fn new(set: &ScanSet) -> Result<Reference> {
+    pub fn new(set: &ScanSet) -> Result<PosedReference> {
         let scans: Vec<PreparedScan> =
             set.views.iter().map(|v| PreparedScan::new(&v.scan)).collect::<Result<_>>()?;
         let points: Vec<Vec<Vec3>> = scans
@@ -44,7 +44,7 @@ impl Reference {
             .map(|s| s.sample(POINTS).into_iter().map(|i| s.points[i]).collect())
             .collect();
         let mean = |p: &Vec<Vec3>| p.iter().sum::<Vec3>() / p.len().max(1) as f64;
-        Ok(Reference {
+        Ok(PosedReference {
             centers: points.iter().map(mean).collect(),
             poses: set.views.iter().map(|v| v.object_from_sensor).collect(),
             scans,

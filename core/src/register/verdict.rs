@@ -87,9 +87,7 @@ impl Verdict {
             free_directions: free,
         }
     }
-}
 
-impl Verdict {
     /// The same alignment, but put aside if there is a `problem`.
     pub(crate) fn unless(self, problem: Option<String>) -> Verdict {
         match problem {
