@@ -43,12 +43,15 @@ pub(crate) fn revise(
         .filter(|&i| registration.verdicts[i].status == Status::Accepted)
         .collect();
     let now: &Registration = registration;
-    let open = |&&i: &&usize| !now.verdicts[i].free_directions.is_empty();
+    let information = now.pose_sigma.information();
+    // A prior that holds a scan within reach of its surface leaves it no other place.
+    let loose = |sample: &Sample| 3.0 * sample.moved_by(&information) > sample.reach(sample.noise);
+    let open = |&&i: &&usize| !now.verdicts[i].free_directions.is_empty() && loose(&samples[i]);
     let look = |&own: &usize| -> Option<(usize, Pose)> {
         let others = members.iter().filter(|&&i| i != own);
         let placed = others.map(|&i| (&samples[i], &now.poses[i]));
         let map = Sample::map_of(placed, samples[0].target_spacing);
-        let prior = Prior { pose: robot[own], information: now.pose_sigma.information() };
+        let prior = Prior { pose: robot[own], information };
         let look = Look { sample: &samples[own], map: &map, prior, params };
         look.better_than(&now.poses[own]).map(|pose| (own, pose))
     };

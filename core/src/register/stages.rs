@@ -31,9 +31,8 @@ pub(crate) fn waiting(sigma: PoseSigma) -> Verdict {
     Verdict { status: Status::Deferred, ..Verdict::first(&sigma.information()) }
 }
 
-/// Aligns all scans to the first (where few can join it, to the one most others overlap with) and to those accepted
-/// before them; those that no round could place are refused
-/// and keep the robot's pose.
+/// Aligns all scans to the first (where few can join it, to the one that most others overlap with) and to those accepted
+/// before them; those that no round could place are refused and keep the robot's pose.
 pub(crate) fn two_stages(
     samples: &[Sample],
     robot: &[Pose],
