@@ -5,7 +5,7 @@ use super::place::place;
 use super::sample::Sample;
 use super::stages::waiting;
 use super::verdict::{Status, Verdict};
-use super::{PoseSigma, PreparedScan, RegisterParams, Registration, register_samples};
+use super::{Method, PoseSigma, PreparedScan, RegisterParams, Registration, register_samples};
 use crate::geometry::Pose;
 use crate::{Progress, Result};
 
@@ -89,7 +89,11 @@ impl Registrar {
 
     /// Looks for a scan that waits as `index` does, and which it fits: the two join together, where the robot puts the
     /// one that came first. Otherwise nothing could be built on a first scan that nothing else overlaps with.
+    /// The thesis has each wait for the first scan's map.
     fn pair_up(&mut self, index: usize) -> Option<usize> {
+        if self.params.method == Method::Thesis {
+            return None;
+        }
         let prior = Prior::of(&self.robot[index], self.pose_sigma);
         let partner = (0..index).rev().filter(|&i| self.verdicts[i].status == Status::Deferred);
         let (partner, pose, verdict) = partner.take(PARTNERS).find_map(|i| {
