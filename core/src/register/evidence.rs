@@ -18,10 +18,10 @@
 use super::RegisterParams;
 use super::align::{Map, Prior};
 use super::correlation::{Correlation, Residuals};
-use super::factors::{point_to_plane, tukey};
+use super::factors::{point_motion, point_to_plane, tukey};
 use super::sample::Sample;
-use crate::geometry::{Mat6, Pose, Twist, Vec3, exp, log, median, skew};
-use nalgebra::{DMatrix, Matrix3x6, SymmetricEigen};
+use crate::geometry::{Mat6, Pose, Twist, Vec3, exp, log, median};
+use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
 /// Standard errors by which the information on a direction must stand out of zero.
@@ -134,9 +134,7 @@ impl Directions {
     fn of(kept: &[(&Match, f64)]) -> Option<Directions> {
         let (mut metric, mut cross) = (Mat6::zeros(), Mat6::zeros());
         for (m, weight) in kept {
-            let mut moves = Matrix3x6::zeros();
-            moves.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-            moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&m.point));
+            let moves = point_motion(&m.point);
             metric += moves.transpose() * moves * *weight;
             let product = m.own * m.other.transpose() * (0.5 * weight);
             cross += product + product.transpose();

@@ -23,6 +23,14 @@ pub fn point_to_point(pose: &Pose, p: &Vec3, m: &Vec3) -> (Vec3, Matrix3x6<f64>)
     (rotation * p + pose.translation.vector - m, jacobian)
 }
 
+/// Derivative of a point `p` (moving frame, metres) by the pose, in the moving frame: `[I, -p^]`.
+pub fn point_motion(p: &Vec3) -> Matrix3x6<f64> {
+    let mut moves = Matrix3x6::zeros();
+    moves.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+    moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+    moves
+}
+
 /// Weight of Tukey's biweight for a residual `r` in units of its standard deviation; 4.685 keeps 95 % of
 /// the efficiency of least squares under Gaussian noise (Huber & Ronchetti 2009, §7.8).
 pub fn tukey(r: f64) -> f64 {

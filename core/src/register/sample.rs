@@ -1,9 +1,9 @@
 //! One scan made ready for registration.
 
 use super::align::{Map, Moving, Rejection, Surface, boundary, select};
+use super::factors::point_motion;
 use super::{PreparedScan, RegisterParams};
-use crate::geometry::{Aabb, Mat6, Pose, Vec3, median, skew};
-use nalgebra::Matrix3x6;
+use crate::geometry::{Aabb, Mat6, Pose, Vec3, median};
 
 /// One scan made ready for registration, sensor frame.
 pub(crate) struct Sample {
@@ -94,9 +94,7 @@ impl Sample {
         let Some(covariance) = information.try_inverse() else { return f64::INFINITY };
         let stride = self.points.len().div_ceil(PROBES).max(1);
         let probes = self.points.iter().step_by(stride).map(|p| {
-            let mut moves = Matrix3x6::zeros();
-            moves.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-            moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+            let moves = point_motion(p);
             (moves * covariance * moves.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
         });
         median(probes.collect()).unwrap_or(0.0)

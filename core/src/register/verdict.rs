@@ -144,7 +144,7 @@ fn problem(
 }
 
 /// What is wrong with a pose that lies too far from where the prior believes it.
-pub(crate) fn correction(pose: &Pose, prior: &Prior, params: &RegisterParams) -> Option<String> {
+fn correction(pose: &Pose, prior: &Prior, params: &RegisterParams) -> Option<String> {
     let xi = log(&(prior.pose.inverse() * pose));
     let mahalanobis = xi.dot(&(prior.information * xi)).sqrt();
     (mahalanobis > chi(params.max_correction)).then(|| {
