@@ -95,7 +95,8 @@ impl<T: Copy + Default> BlockGrid<T> {
 
     /// The slot of `voxel`; `None` outside the box.
     pub fn slot(&self, voxel: Voxel) -> Option<u32> {
-        let local = [0, 1, 2].map(|i| voxel[i] - self.low[i]);
+        // A point far off has a voxel at the end of the numbers.
+        let local = [0, 1, 2].map(|i| voxel[i].saturating_sub(self.low[i]));
         (0..3).all(|i| (0..self.size[i]).contains(&local[i])).then(|| self.slot_of_local(local))
     }
 
@@ -175,7 +176,7 @@ impl<T: Copy + Default> BlockGrid<T> {
         }
         let start = origin + direction * from;
         let local = [0, 1, 2].map(|i| {
-            let voxel = (start[i] / self.edge).floor() as i32 - self.low[i];
+            let voxel = ((start[i] / self.edge).floor() as i32).saturating_sub(self.low[i]);
             voxel.clamp(0, self.size[i] - 1)
         });
         let step = [0, 1, 2].map(|i| direction[i].partial_cmp(&0.0).map_or(0, |o| o as i32));
