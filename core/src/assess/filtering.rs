@@ -28,7 +28,7 @@ use serde::Serialize;
 /// Standard deviations beyond which a labelled measurement is an outlier.
 const FAR: f64 = 4.0;
 /// Points of the cloud whose limit is taken: its mean square is then known to some per cent.
-const LIMITED: usize = 600;
+const LIMITED: usize = 2400;
 /// Cosine between the normals of one side of a surface at least.
 const ONE_SIDE: f64 = 0.7;
 

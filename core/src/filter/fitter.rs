@@ -17,6 +17,10 @@ const SURELY: f64 = 4.0;
 pub(super) const LEAST_RADIUS: f64 = 4.0;
 /// Measurements that a smaller radius must hold, in those that support a point.
 const DENSE: usize = 4;
+/// If the surface lies farther from the seed than this share of the radius, or its normal is turned by more than this
+/// cosine, it is fitted anew about the foot point: what lies within reach of a noisy seed leans towards the seed.
+const OFF: f64 = 0.1;
+const TURNED: f64 = 0.99;
 /// The smaller radii, in the noise radius.
 const SMALLER: [f64; 2] = [0.6, 0.36];
 
@@ -66,48 +70,81 @@ impl<'a> Fitter<'a> {
         self.fit_within(seed, &self.near(seed), 1.0)
     }
 
-    fn near(&self, seed: usize) -> Vec<(usize, f64)> {
+    /// The measurements within a cylinder about the seed, whatever its axis: as deep as wide, so that noise does not decide
+    /// which belong.
+    fn near(&self, seed: usize) -> Vec<usize> {
         let (points, mut near) = (&self.merged.points, Vec::new());
-        self.cells.for_each_within(points, &points[seed], self.radius, |i, d| near.push((i, d)));
+        let search = self.radius * std::f64::consts::SQRT_2;
+        self.cells.for_each_within(points, &points[seed], search, |i, _| near.push(i));
         near
     }
 
-    fn fit_within(&self, seed: usize, near: &[(usize, f64)], share: f64) -> Option<Fit> {
+    fn fit_within(&self, seed: usize, near: &[usize], share: f64) -> Option<Fit> {
         let (merged, radius) = (self.merged, self.radius * share);
         let point = merged.points[seed];
         let cosine = self.params.max_normal_angle.cos();
-        let inside = near.iter().filter(|(_, square)| *square <= radius * radius);
-        let near: Vec<usize> = inside.map(|(i, _)| *i).collect();
-        let normal = mean_normal(merged, &near, &merged.normals[seed], cosine)?;
-        let measured: Vec<Measured> = near
-            .iter()
-            .filter(|&&i| merged.normals[i].dot(&normal) >= cosine)
-            .map(|&i| Measured {
-                point: merged.points[i],
-                scan: merged.scan[i],
-                sigma: f64::from(merged.sigma[i]),
-            })
-            .collect();
+        let normal = mean_normal(merged, near, &point, radius, &merged.normals[seed], cosine)?;
         let enough = if share < 1.0 { DENSE } else { 1 } * self.params.min_measurements;
-        if measured.len() < enough {
-            return None;
+        let fit_about = |center: &Vec3, normal: &Vec3| {
+            let measured = self.in_cylinder(near, center, normal, radius);
+            let fit = if measured.len() < enough {
+                None
+            } else {
+                fit(&measured, center, normal, radius, &self.noise)
+            };
+            fit.map(|fit| (fit, measured.len()))
+        };
+        let (mut fit, mut count) = fit_about(&point, &normal)?;
+        if (fit.point - point).norm() > OFF * radius || fit.normal.dot(&normal) < TURNED {
+            (fit, count) = fit_about(&fit.point, &fit.normal)?;
         }
-        let mut fit = fit(&measured, &point, &normal, radius, &self.noise)?;
         let moved = (fit.point - point).norm();
         let good = fit.effective >= self.params.min_measurements as f64 / 2.0
-            && fit.effective >= LEAST_AGREEMENT * measured.len() as f64
+            && fit.effective >= LEAST_AGREEMENT * count as f64
             && moved < 0.7 * self.radius
             && fit.normal.dot(&normal) > cosine;
         // As many as there would be within the whole radius, so that support compares.
         fit.effective /= share * share;
         good.then_some(fit)
     }
+
+    /// Those of `near` on the side of `normal`, along the surface within `radius` of `center`.
+    fn in_cylinder(
+        &self,
+        near: &[usize],
+        center: &Vec3,
+        normal: &Vec3,
+        radius: f64,
+    ) -> Vec<Measured> {
+        let (merged, cosine) = (self.merged, self.params.max_normal_angle.cos());
+        let inside = |&i: &usize| {
+            let offset = merged.points[i] - center;
+            let height = offset.dot(normal);
+            merged.normals[i].dot(normal) >= cosine
+                && offset.norm_squared() - height * height <= radius * radius
+                && height.abs() <= self.radius
+        };
+        let measured = |i: usize| Measured {
+            point: merged.points[i],
+            scan: merged.scan[i],
+            sigma: f64::from(merged.sigma[i]),
+        };
+        near.iter().copied().filter(inside).map(measured).collect()
+    }
 }
 
-/// Mean of the normals on the side of `start`, twice, so that the start matters little.
-fn mean_normal(merged: &Merged, near: &[usize], start: &Vec3, cosine: f64) -> Option<Vec3> {
+/// Mean of the normals within `radius` of `center` on the side of `start`, twice, so that the start matters little.
+fn mean_normal(
+    merged: &Merged,
+    near: &[usize],
+    center: &Vec3,
+    radius: f64,
+    start: &Vec3,
+    cosine: f64,
+) -> Option<Vec3> {
+    let inside = |i: &&usize| (merged.points[**i] - center).norm_squared() <= radius * radius;
+    let normals: Vec<Vec3> = near.iter().filter(inside).map(|&i| merged.normals[i]).collect();
     (0..2).try_fold(*start, |axis, _| {
-        let alike = near.iter().map(|&i| merged.normals[i]).filter(|n| n.dot(&axis) >= cosine);
-        alike.sum::<Vec3>().try_normalize(0.0)
+        normals.iter().filter(|n| n.dot(&axis) >= cosine).sum::<Vec3>().try_normalize(0.0)
     })
 }

@@ -1,6 +1,6 @@
 //! All scans' measurements in the object frame.
 
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{NoiseModel, Pose, Vec3};
 use crate::register::PreparedScan;
 
 /// No sensor is better, metres.
@@ -15,10 +15,12 @@ pub(super) struct Merged {
     pub rays: Vec<Vec3>,
     /// The scan of each measurement.
     pub scan: Vec<u16>,
-    /// Standard deviation along the normal, within its scan, metres.
+    /// Standard deviation along the normal, metres: of several scans that of their sensor.
     pub sigma: Vec<f32>,
     /// Distance of the sensor, metres.
     pub range: Vec<f32>,
+    /// The noise of the sensor that took the scans, as each sees it for itself.
+    pub sensor: NoiseModel,
 }
 
 impl Merged {
@@ -31,6 +33,7 @@ impl Merged {
             scan: Vec::with_capacity(total),
             sigma: Vec::with_capacity(total),
             range: Vec::with_capacity(total),
+            sensor: NoiseModel::of_scans(scans.iter().map(|(scan, _)| &scan.model)),
         };
         for (index, (scan, pose)) in scans.iter().enumerate() {
             let count = scan.points.len();
@@ -43,6 +46,16 @@ impl Merged {
             merged.range.extend_from_slice(&scan.range);
             merged.sigma.extend(scan.sigma.iter().map(|s| s.max(LEAST_SIGMA)));
         }
+        if scans.len() > 1 {
+            merged.sigma = merged.of_one_sensor();
+        }
         merged
+    }
+
+    fn of_one_sensor(&self) -> Vec<f32> {
+        let seen = self.range.iter().zip(&self.rays).zip(&self.normals);
+        seen.map(|((range, ray), normal)| self.sensor.at(f64::from(*range), ray.dot(normal)) as f32)
+            .map(|sigma| sigma.max(LEAST_SIGMA))
+            .collect()
     }
 }

@@ -8,8 +8,11 @@
 mod fitter;
 mod learnt;
 mod merged;
+mod mixed;
+mod neighbours;
 mod quadric;
 mod refused;
+mod standing;
 mod thesis;
 mod weighted;
 
@@ -57,7 +60,7 @@ pub struct Filtered {
     /// Number of measurements that went in.
     pub measurements: usize,
     /// For each scan, ascending, the points of the raw scan ([`PreparedScan::source`]) that no point of the cloud
-    /// explains: those farther from it than four standard deviations.
+    /// explains: those farther from it than the noise and what it shares with its neighbours let expect.
     pub refused: Vec<Vec<u32>>,
     /// What the noise is made of, in units of the variances that the scans state.
     pub noise: Components,
@@ -97,7 +100,7 @@ pub fn filter(
     }
     progress.report("filter", 1.0)?;
     let cloud = cloud.to_single_precision();
-    let refused = refused::refused(scans, &merged, &cloud, noise_radius, &noise);
+    let refused = refused::refused(scans, &merged, &cloud, noise_radius, reduction_radius, &noise);
     let measurements = merged.points.len();
     Ok(Filtered {
         cloud,

@@ -1,8 +1,9 @@
 //! A height field fitted robustly over a tangent plane (Levin 2003, Mesh-independent surface interpolation;
 //! weights as in iteratively reweighted least squares).
 
+use super::mixed::{Equations, Local, Terms};
 use crate::geometry::{Components, Moments, Vec3, any_orthogonal};
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::SVector;
 
 /// One measurement seen by the fit.
 #[derive(Clone, Copy)]
@@ -29,26 +30,12 @@ pub(super) struct Fit {
     pub moments: Moments,
 }
 
-const TERMS: usize = 6;
 /// Reweighting passes; the weights change by less than a per cent after four.
 const PASSES: usize = 4;
 /// Tukey's constant: 95 % efficient for normal noise.
 const TUKEY: f64 = 4.685;
 /// Variance of normal numbers under those weights: `E[w x^2] / E[w]`.
 const TUKEY_VARIANCE: f64 = 0.829;
-
-type Terms = SVector<f64, TERMS>;
-
-/// A measurement over the tangent plane, lengths in radii.
-struct Local {
-    terms: Terms,
-    height: f64,
-    sigma: f64,
-    scan: usize,
-    /// By distance from the seed.
-    near: f64,
-    robust: f64,
-}
 
 /// Fits the surface near `seed` with start normal `normal` from measurements within `radius`, whose noise is made of
 /// `noise`. `None` if too few agree.
@@ -75,70 +62,30 @@ pub(super) fn fit(
                 height: offset.dot(normal),
                 sigma: m.sigma / radius,
                 scan: scans.partition_point(|s| *s < m.scan),
-                near: near * near,
+                near,
                 robust: 1.0,
             }
         })
         .collect();
     let mut solved = None;
     for pass in 0..PASSES {
-        let weights = weights(&local, scans.len(), noise);
-        let factor = factor(&local, &weights)?;
-        let coefficients = factor.solve(&right(&local, &weights));
+        let equations = Equations::new(&local, scans.len(), noise);
+        let factor = equations.factor()?;
+        let coefficients = factor.solve(&equations.right);
         reweight(&mut local, &coefficients, noise, pass == 0);
-        solved = Some((coefficients, weights, factor));
+        solved = Some((coefficients, equations, factor));
     }
-    let (coefficients, weights, factor) = solved?;
+    let (coefficients, equations, factor) = solved?;
     let slope = u * coefficients[1] + v * coefficients[2];
     let spread = Spread::new(&local, scans.len(), &coefficients);
-    let variance = variance(&local, &weights, &factor, scans.len(), noise);
     Some(Fit {
         point: seed + normal * (coefficients[0] * radius),
         normal: (normal - slope).normalize(),
-        sigma: variance.sqrt() * radius,
+        sigma: equations.variance(&factor).sqrt() * radius,
         effective: local.iter().map(|l| l.robust).sum(),
         support: spread.support,
         moments: spread.moments,
     })
-}
-
-/// Inverse variances. What the neighbours of a scan share does not average out within the scan: each is given its
-/// part of the variance of all of them together.
-fn weights(local: &[Local], scans: usize, noise: &Components) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0); scans];
-    for l in local {
-        let w = l.near * l.robust;
-        sums[l.scan].0 += w;
-        sums[l.scan].1 += w * w;
-    }
-    let count = |(sum, squares): (f64, f64)| if squares > 0.0 { sum * sum / squares } else { 1.0 };
-    let repeated: Vec<f64> = sums.into_iter().map(|s| noise.repeated(count(s))).collect();
-    local.iter().map(|l| l.near * l.robust / (l.sigma * l.sigma * repeated[l.scan])).collect()
-}
-
-fn right(local: &[Local], weights: &[f64]) -> Terms {
-    local.iter().zip(weights).map(|(l, w)| l.terms * (l.height * w)).sum()
-}
-
-fn factor(local: &[Local], weights: &[f64]) -> Option<Cholesky<f64, Const<TERMS>>> {
-    let mut matrix = SMatrix::<f64, TERMS, TERMS>::zeros();
-    let mut total = 0.0;
-    for (l, w) in local.iter().zip(weights) {
-        matrix += l.terms * l.terms.transpose() * *w;
-        total += w;
-    }
-    if total <= 0.0 {
-        return None;
-    }
-    // A weak belief in flatness (and, weaker, in zero slope) decides where measurements cannot. It is strong
-    // at the border of the measured area, where a curvature would be an extrapolation.
-    let aside = (matrix[(0, 1)].powi(2) + matrix[(0, 2)].powi(2)) / (total * total);
-    let (slope, curvature) = (1e-3 + 0.1 * aside, 1e-2 + 4.0 * aside);
-    for (i, belief) in [1e-9, slope, slope, curvature, curvature, curvature].into_iter().enumerate()
-    {
-        matrix[(i, i)] += belief * total;
-    }
-    matrix.cholesky()
 }
 
 /// Tukey's weights by residuals in standard deviations.
@@ -147,33 +94,13 @@ fn reweight(local: &mut [Local], coefficients: &Terms, noise: &Components, lenie
     let mut sizes: Vec<f64> = local.iter().map(residual).collect();
     let middle = sizes.len() / 2;
     let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let scale = (1.4826 * median).max(0.5 * noise.total().sqrt());
+    let scale = (1.4826 * median).max(noise.total().sqrt());
     // The first pass may lean on an outlier or another sheet: be lenient, then strict.
     let reach = if lenient { 3.0 } else { 1.0 } * TUKEY * scale;
     for l in local {
         let r = residual(l) / reach;
         l.robust = if r < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 };
     }
-}
-
-/// Variance of the height at the seed: that of a sum of the heights, of which those of one scan share a part.
-fn variance(
-    local: &[Local],
-    weights: &[f64],
-    factor: &Cholesky<f64, Const<TERMS>>,
-    scans: usize,
-    noise: &Components,
-) -> f64 {
-    let mut first = Terms::zeros();
-    first[0] = 1.0;
-    let influence = factor.solve(&first);
-    let (mut white, mut shared) = (0.0, vec![0.0; scans]);
-    for (l, w) in local.iter().zip(weights) {
-        let part = w * l.terms.dot(&influence) * l.sigma;
-        white += part * part;
-        shared[l.scan] += part;
-    }
-    noise.white * white + noise.shared * shared.iter().map(|s| s * s).sum::<f64>()
 }
 
 /// How the residuals of the scans spread.

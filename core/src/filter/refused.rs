@@ -1,30 +1,21 @@
 //! Which measurements the filtered cloud does not explain.
 
 use super::learnt::Learnt;
-use super::merged::{LEAST_SIGMA, Merged};
-use crate::geometry::{Cloud, NoiseModel, Pose, Vec3};
+use super::merged::Merged;
+use super::neighbours::Neighbours;
+use super::standing::{Explainer, Measurement, Standing};
+use crate::geometry::{Cloud, Pose};
 use crate::register::PreparedScan;
-use crate::voxel::CellIndex;
 use rayon::prelude::*;
 
-/// Standard deviations within which a measurement belongs to a surface: one good one in 16,000 lies beyond.
-const REACH: f64 = 4.0;
-/// Along the surface, a point of the cloud speaks for this many noise radii around.
-const BESIDE: f64 = 0.75;
-/// A surface is not measured from behind; normals are uncertain by some degrees.
-const BEHIND: f64 = 0.1;
-
-/// Cosine from which on a ray surely meets the surface near by. At a more grazing angle it may pass over it.
-const FACING: f64 = 0.4;
-
-/// One measurement, object frame.
-struct Measurement<'a> {
-    point: Vec3,
-    ray: Vec3,
-    range: f64,
-    /// Of its scan.
-    model: &'a NoiseModel,
-}
+/// The standard deviations within which measurements are believed whose scan gave them a normal: few are outliers.
+const REACH_OF_ORIENTED: f64 = 4.5;
+/// The least of the others.
+const LEAST_REACH: f64 = 2.0;
+/// Good ones among those refused if they were normal to the ends; their tails are some times heavier.
+const FALSE: f64 = 0.004;
+/// Standard deviations beyond which there are outliers only.
+const SURELY_OUT: f64 = 6.0;
 
 /// The raw points of each scan that belong to no point of `cloud`, ascending.
 pub(super) fn refused(
@@ -32,74 +23,74 @@ pub(super) fn refused(
     merged: &Merged,
     cloud: &Cloud,
     noise_radius: f64,
+    spacing: f64,
     noise: &Learnt,
 ) -> Vec<Vec<u32>> {
-    let total = noise.components.total().sqrt();
-    let largest = merged.sigma.iter().copied().fold(LEAST_SIGMA, f32::max);
-    let beside = BESIDE * noise_radius;
-    let search = beside + 1.5 * REACH * total * f64::from(largest);
-    let cells = CellIndex::new(&cloud.points, search);
-    let explainer =
-        Explainer { cells, cloud, beside, search, total, correction: &noise.correction };
-    let mut refused = Vec::with_capacity(scans.len());
-    for (scan, pose) in scans {
-        let lost = |point: &Vec3, ray: &Vec3, range: f32| {
-            !explainer.explains(&Measurement {
-                point: pose.rotation * point + pose.translation.vector,
-                ray: pose.rotation * ray,
-                range: f64::from(range),
-                model: &scan.model,
-            })
+    let explainer = Explainer::new(cloud, merged, noise_radius, spacing, noise);
+    let of_scan = |(scan, pose): &(&PreparedScan, Pose)| -> Vec<Judged> {
+        let all = Measurement::all_of(scan, pose);
+        let standings: Vec<Option<Standing>> =
+            all.par_iter().map(|m| explainer.standing(m)).collect();
+        let neighbours = Neighbours::new(&standings, noise_radius, &noise.components);
+        let off = |s: &Option<Standing>| s.as_ref().map_or(f64::INFINITY, |s| neighbours.off(s));
+        let judged = |(m, s): (&Measurement, &Option<Standing>)| Judged {
+            source: m.source,
+            oriented: m.oriented,
+            off: off(s),
         };
-        let oriented = (0..scan.points.len()).into_par_iter();
-        let oriented = oriented.filter(|&i| lost(&scan.points[i], &scan.rays[i], scan.range[i]));
-        let mut found: Vec<u32> = oriented.map(|i| scan.source[i]).collect();
-        let aside = scan.aside.par_iter().filter(|a| lost(&a.point, &a.ray, a.range));
-        found.extend(aside.map(|a| a.source).collect::<Vec<u32>>());
+        all.par_iter().zip(&standings).map(judged).collect()
+    };
+    let judged: Vec<Vec<Judged>> = scans.iter().map(of_scan).collect();
+    let reach = [reach_of_aside(&judged), REACH_OF_ORIENTED];
+    let lost = |scan: Vec<Judged>| {
+        let beyond = scan.into_iter().filter(|j| j.off > reach[usize::from(j.oriented)]);
+        let mut found: Vec<u32> = beyond.map(|j| j.source).collect();
         found.sort_unstable();
-        refused.push(found);
-    }
-    refused
+        found
+    };
+    judged.into_iter().map(lost).collect()
 }
 
-struct Explainer<'a> {
-    cloud: &'a Cloud,
-    cells: CellIndex,
-    /// Along the surface, metres.
-    beside: f64,
-    /// In all, metres.
-    search: f64,
-    /// Standard deviation of a measurement in corrected ones.
-    total: f64,
-    correction: &'a NoiseModel,
+/// A measurement and how far it is off in standard deviations: infinite if there is no surface beside it.
+struct Judged {
+    source: u32,
+    oriented: bool,
+    off: f64,
 }
 
-impl Explainer<'_> {
-    fn explains(&self, m: &Measurement) -> bool {
-        let cloud = self.cloud;
-        let mut explained = false;
-        self.cells.for_each_within(&cloud.points, &m.point, self.search, |j, _| {
-            if explained {
-                return;
-            }
-            let normal = &cloud.normals[j];
-            let offset = m.point - cloud.points[j];
-            let (height, cosine) = (offset.dot(normal), m.ray.dot(normal));
-            if cosine > BEHIND || !self.is_beside(&offset, height, m, cosine) {
-                return;
-            }
-            let stated = m.model.at(m.range, cosine).max(f64::from(LEAST_SIGMA));
-            let sigma = stated * self.correction.at(m.range, cosine) * self.total;
-            explained = height.abs() <= REACH * sigma.hypot(cloud.sigma[j]);
-        });
-        explained
-    }
+/// The standard deviations within which measurements are believed that have no normal: so many that few of those beyond are
+/// good (false discovery rate). Those that are good lie off their neighbours and scatter more than others:
+/// they are taken for normal numbers whose scale follows from how many lie near the surface, where outliers are few (empirical
+/// null; Efron 2010, Large-scale inference, ch. 6).
+fn reach_of_aside(judged: &[Vec<Judged>]) -> f64 {
+    let count = |low: f64, high: f64| {
+        let aside = judged.iter().flatten().filter(|j| !j.oriented);
+        aside.filter(|j| j.off >= low && j.off < high).count() as f64
+    };
+    let outliers = judged.iter().flatten().filter(|j| !j.oriented && j.off >= SURELY_OUT).count();
+    // The logarithm of the normal density falls by x^2 / 2; the middles of both counts are 1/2 and 3/2.
+    let fall = (count(0.0, 1.0).max(1.0) / count(1.0, 2.0).max(1.0)).ln();
+    let scale = if fall > 0.0 { fall.powf(-0.5).max(1.0) } else { f64::INFINITY };
+    let good = count(0.0, SURELY_OUT).max(1.0);
+    let tail = (FALSE * outliers as f64 / good).clamp(1e-9, 0.1);
+    (scale * normal_reach(tail)).clamp(LEAST_REACH, REACH_OF_ORIENTED)
+}
 
-    /// Whether the measurement, moved to the tangent plane along its normal or along the ray, on which the noise is, comes
-    /// near to the point.
-    fn is_beside(&self, offset: &Vec3, height: f64, m: &Measurement, cosine: f64) -> bool {
-        let square = self.beside * self.beside;
-        offset.norm_squared() - height * height <= square
-            || (cosine < -FACING && (offset - m.ray * (height / cosine)).norm_squared() <= square)
+/// Beyond this on both sides lies the part `tail` of normal numbers (Mills' ratio, exact to a hundredth below a tenth).
+fn normal_reach(tail: f64) -> f64 {
+    let density = (2.0 / std::f64::consts::PI).sqrt() / tail;
+    let beyond = |x: f64| (2.0 * (density / (x + 0.8 / (x + 1.0))).ln()).max(1.0).sqrt();
+    (0..20).fold(2.0, |x, _| beyond(x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reach_of_normal_numbers_is_that_of_tables() {
+        for (tail, reach) in [(0.1, 1.645), (0.05, 1.960), (0.01, 2.576), (6.3e-5, 4.0)] {
+            assert!((normal_reach(tail) - reach).abs() < 0.03, "{tail}: {}", normal_reach(tail));
+        }
     }
 }

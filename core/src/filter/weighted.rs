@@ -12,7 +12,7 @@ use crate::{Progress, Result};
 use rayon::prelude::*;
 
 /// Points with less than this share of the median number of agreeing measurements float in space.
-const LEAST_SHARE: f64 = 0.08;
+const LEAST_SHARE: f64 = 0.02;
 /// Radius within which standard deviations are pooled, in reduction radii: some thirty points.
 const POOL: f64 = 3.0;
 /// Scans' worth of belief in the noise that is common to all points.

@@ -65,6 +65,21 @@ impl NoiseModel {
         self.sigma * far.powf(self.range_power) * slant.powf(-self.slant_power)
     }
 
+    /// The model of a sensor of which several scans were taken: the medians of theirs, each of which has seen too little of
+    /// the ranges and incidences.
+    pub fn of_scans<'a>(models: impl Iterator<Item = &'a NoiseModel> + Clone) -> NoiseModel {
+        let typical = |f: &dyn Fn(&NoiseModel) -> f64| {
+            median(models.clone().map(f).filter(|v| v.is_finite()).collect()).unwrap_or(0.0)
+        };
+        let at_range = typical(&|m| m.at_range).max(f64::MIN_POSITIVE);
+        NoiseModel {
+            sigma: typical(&|m| m.at(at_range, 1.0)),
+            at_range,
+            range_power: typical(&|m| m.range_power),
+            slant_power: typical(&|m| m.slant_power),
+        }
+    }
+
     /// The model of a sensor, none of which is better far away or at grazing incidence.
     pub fn of_sensor(self) -> NoiseModel {
         NoiseModel {
@@ -143,16 +158,6 @@ impl Components {
     /// Variance of one measurement.
     pub fn total(&self) -> f64 {
         self.white + self.shared
-    }
-
-    /// Variance of the mean of `count` neighbours of one scan.
-    pub fn of_mean(&self, count: f64) -> f64 {
-        self.shared + self.white / count
-    }
-
-    /// How many neighbours count as one measurement: 1 for white noise, `count` where all share one error.
-    pub fn repeated(&self, count: f64) -> f64 {
-        count * self.of_mean(count) / self.total()
     }
 }
 
@@ -273,7 +278,6 @@ mod tests {
         let found = moments.components();
         assert!((found.white - 1.0).abs() < 0.05, "{found:?}");
         assert!((found.shared - 4.0).abs() < 0.4, "{found:?}");
-        assert!((found.repeated(20.0) - 16.2).abs() < 0.5, "{}", found.repeated(20.0));
         assert_eq!(Moments::default().components(), Components::WHITE);
     }
 }

@@ -1,0 +1,102 @@
+//! Least squares for the terms of a quadric where the noise is made of a white part and one that the measurements of a scan
+//! share.
+
+use crate::geometry::Components;
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+
+/// Of a quadric: 1, u, v, u^2, u v, v^2.
+const TERMS: usize = 6;
+
+pub(super) type Terms = SVector<f64, TERMS>;
+
+/// A measurement over the tangent plane, lengths in radii.
+pub(super) struct Local {
+    pub terms: Terms,
+    pub height: f64,
+    pub sigma: f64,
+    pub scan: usize,
+    /// By distance from the seed.
+    pub near: f64,
+    pub robust: f64,
+}
+
+/// Generalised least squares, where the measurements of a scan share a random offset (mixed model; Searle, Casella,
+/// McCulloch 1992, ch. 6): what they share does not average out within the scan.
+pub(super) struct Equations {
+    matrix: SMatrix<f64, TERMS, TERMS>,
+    pub right: Terms,
+    /// Of each measurement the terms, the weight if all noise were white, and the scan.
+    rows: Vec<(Terms, f64, usize)>,
+    scans: Vec<Shared>,
+    noise: Components,
+}
+
+/// What the measurements of a scan have in common, each in its standard deviations.
+#[derive(Clone, Default)]
+struct Shared {
+    terms: Terms,
+    height: f64,
+    weight: f64,
+    /// The part of the sums that their common offset may explain.
+    part: f64,
+}
+
+impl Equations {
+    pub(super) fn new(local: &[Local], scans: usize, noise: &Components) -> Equations {
+        let mut matrix = SMatrix::zeros();
+        let mut right = Terms::zeros();
+        let mut shared = vec![Shared::default(); scans];
+        let mut rows = Vec::with_capacity(local.len());
+        for l in local {
+            let weight = l.near * l.robust / noise.white;
+            let (terms, height) = (l.terms / l.sigma, l.height / l.sigma);
+            matrix += terms * terms.transpose() * weight;
+            right += terms * (height * weight);
+            let scan = &mut shared[l.scan];
+            scan.terms += terms * weight;
+            scan.height += height * weight;
+            scan.weight += weight;
+            rows.push((terms, weight, l.scan));
+        }
+        for scan in &mut shared {
+            scan.part = noise.shared / (1.0 + noise.shared * scan.weight);
+            matrix -= scan.terms * scan.terms.transpose() * scan.part;
+            right -= scan.terms * (scan.height * scan.part);
+        }
+        Equations { matrix, right, rows, scans: shared, noise: *noise }
+    }
+
+    /// `None` if nothing agrees.
+    pub(super) fn factor(&self) -> Option<Cholesky<f64, Const<TERMS>>> {
+        let mut matrix = self.matrix;
+        let total = matrix[(0, 0)];
+        if total <= 0.0 {
+            return None;
+        }
+        // A weak belief in flatness (and, weaker, in zero slope) decides where measurements cannot. It is strong
+        // at the border of the measured area, where a curvature would be an extrapolation.
+        let aside = (matrix[(0, 1)].powi(2) + matrix[(0, 2)].powi(2)) / (total * total);
+        let (slope, curvature) = (1e-3 + 0.1 * aside, 1e-2 + 4.0 * aside);
+        let beliefs = [1e-9, slope, slope, curvature, curvature, curvature];
+        for (i, belief) in beliefs.into_iter().enumerate() {
+            matrix[(i, i)] += belief * total;
+        }
+        matrix.cholesky()
+    }
+
+    /// Variance of the height at the seed: that of a sum of the heights, of which those of one scan share a part.
+    pub(super) fn variance(&self, factor: &Cholesky<f64, Const<TERMS>>) -> f64 {
+        let mut first = Terms::zeros();
+        first[0] = 1.0;
+        let influence = factor.solve(&first);
+        let common: Vec<f64> =
+            self.scans.iter().map(|s| s.part * s.terms.dot(&influence)).collect();
+        let (mut white, mut shared) = (0.0, vec![0.0; self.scans.len()]);
+        for (terms, weight, scan) in &self.rows {
+            let part = weight * (terms.dot(&influence) - common[*scan]);
+            white += part * part;
+            shared[*scan] += part;
+        }
+        self.noise.white * white + self.noise.shared * shared.iter().map(|s| s * s).sum::<f64>()
+    }
+}
