@@ -3,7 +3,7 @@
 use super::FilterParams;
 use super::merged::Merged;
 use super::quadric::{Fit, Measured, fit};
-use crate::geometry::{Components, Vec3};
+use crate::geometry::{Components, Vec3, median};
 use crate::voxel::CellIndex;
 
 /// Of the measurements near a point that has a surface, at least this share agree with it.
@@ -17,6 +17,8 @@ const SURELY: f64 = 4.0;
 pub(super) const LEAST_RADIUS: f64 = 4.0;
 /// Measurements that a smaller radius must hold, in those that support a point.
 const DENSE: usize = 4;
+/// Standard deviations along the normal within which a surface is looked for, but not farther than along it.
+const DEEP: f64 = 14.0;
 /// If the surface lies farther from the seed than this share of the radius, or its normal is turned by more than this
 /// cosine, it is fitted anew about the foot point: what lies within reach of a noisy seed leans towards the seed.
 const OFF: f64 = 0.1;
@@ -29,6 +31,8 @@ pub(super) struct Fitter<'a> {
     merged: &'a Merged,
     cells: CellIndex,
     radius: f64,
+    /// How far from the seed along the normal a measurement may be that belongs, metres.
+    depth: f64,
     params: &'a FilterParams,
     noise: Components,
 }
@@ -40,7 +44,10 @@ impl<'a> Fitter<'a> {
         params: &'a FilterParams,
         noise: Components,
     ) -> Fitter<'a> {
-        Fitter { merged, cells: CellIndex::new(&merged.points, radius), radius, params, noise }
+        let usual = median(merged.sigma.iter().map(|s| f64::from(*s)).collect()).unwrap_or(0.0);
+        let depth = (DEEP * usual * noise.total().sqrt()).min(radius);
+        let cells = CellIndex::new(&merged.points, radius);
+        Fitter { merged, cells, radius, depth, params, noise }
     }
 
     /// The surface at the measurement `seed`, if enough agree on one; within a smaller radius where it bends.
@@ -70,11 +77,10 @@ impl<'a> Fitter<'a> {
         self.fit_within(seed, &self.near(seed), 1.0)
     }
 
-    /// The measurements within a cylinder about the seed, whatever its axis: as deep as wide, so that noise does not decide
-    /// which belong.
+    /// The measurements within a cylinder about the seed, whatever its axis: so deep that noise does not decide which belong.
     fn near(&self, seed: usize) -> Vec<usize> {
         let (points, mut near) = (&self.merged.points, Vec::new());
-        let search = self.radius * std::f64::consts::SQRT_2;
+        let search = self.radius.hypot(self.depth);
         self.cells.for_each_within(points, &points[seed], search, |i, _| near.push(i));
         near
     }
@@ -122,7 +128,7 @@ impl<'a> Fitter<'a> {
             let height = offset.dot(normal);
             merged.normals[i].dot(normal) >= cosine
                 && offset.norm_squared() - height * height <= radius * radius
-                && height.abs() <= self.radius
+                && height.abs() <= self.depth
         };
         let measured = |i: usize| Measured {
             point: merged.points[i],

@@ -9,15 +9,26 @@ const TERMS: usize = 6;
 
 pub(super) type Terms = SVector<f64, TERMS>;
 
-/// A measurement over the tangent plane, lengths in radii.
+/// A measurement over the tangent plane, lengths in radii, divided by its standard deviation.
 pub(super) struct Local {
     pub terms: Terms,
     pub height: f64,
-    pub sigma: f64,
     pub scan: usize,
     /// By distance from the seed.
     pub near: f64,
     pub robust: f64,
+}
+
+impl Local {
+    /// Weight if nothing were shared.
+    pub(super) fn weight(&self) -> f64 {
+        self.near * self.robust
+    }
+
+    /// Height above the surface with these coefficients, in standard deviations.
+    pub(super) fn residual(&self, coefficients: &Terms) -> f64 {
+        self.height - self.terms.dot(coefficients)
+    }
 }
 
 /// Generalised least squares, where the measurements of a scan share a random offset (mixed model; Searle, Casella,
@@ -25,8 +36,8 @@ pub(super) struct Local {
 pub(super) struct Equations {
     matrix: SMatrix<f64, TERMS, TERMS>,
     pub right: Terms,
-    /// Of each measurement the terms, the weight if all noise were white, and the scan.
-    rows: Vec<(Terms, f64, usize)>,
+    /// Of each measurement, if nothing were shared.
+    weights: Vec<f64>,
     scans: Vec<Shared>,
     noise: Components,
 }
@@ -46,24 +57,22 @@ impl Equations {
         let mut matrix = SMatrix::zeros();
         let mut right = Terms::zeros();
         let mut shared = vec![Shared::default(); scans];
-        let mut rows = Vec::with_capacity(local.len());
-        for l in local {
-            let weight = l.near * l.robust / noise.white;
-            let (terms, height) = (l.terms / l.sigma, l.height / l.sigma);
-            matrix += terms * terms.transpose() * weight;
-            right += terms * (height * weight);
+        let weights: Vec<f64> = local.iter().map(|l| l.weight() / noise.white).collect();
+        for (l, &weight) in local.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0) {
+            let terms = l.terms * weight;
+            matrix += terms * l.terms.transpose();
+            right += terms * l.height;
             let scan = &mut shared[l.scan];
-            scan.terms += terms * weight;
-            scan.height += height * weight;
+            scan.terms += terms;
+            scan.height += l.height * weight;
             scan.weight += weight;
-            rows.push((terms, weight, l.scan));
         }
         for scan in &mut shared {
             scan.part = noise.shared / (1.0 + noise.shared * scan.weight);
             matrix -= scan.terms * scan.terms.transpose() * scan.part;
             right -= scan.terms * (scan.height * scan.part);
         }
-        Equations { matrix, right, rows, scans: shared, noise: *noise }
+        Equations { matrix, right, weights, scans: shared, noise: *noise }
     }
 
     /// `None` if nothing agrees.
@@ -85,17 +94,17 @@ impl Equations {
     }
 
     /// Variance of the height at the seed: that of a sum of the heights, of which those of one scan share a part.
-    pub(super) fn variance(&self, factor: &Cholesky<f64, Const<TERMS>>) -> f64 {
+    pub(super) fn variance(&self, factor: &Cholesky<f64, Const<TERMS>>, local: &[Local]) -> f64 {
         let mut first = Terms::zeros();
         first[0] = 1.0;
         let influence = factor.solve(&first);
         let common: Vec<f64> =
             self.scans.iter().map(|s| s.part * s.terms.dot(&influence)).collect();
         let (mut white, mut shared) = (0.0, vec![0.0; self.scans.len()]);
-        for (terms, weight, scan) in &self.rows {
-            let part = weight * (terms.dot(&influence) - common[*scan]);
+        for (l, weight) in local.iter().zip(&self.weights) {
+            let part = weight * (l.terms.dot(&influence) - common[l.scan]);
             white += part * part;
-            shared[*scan] += part;
+            shared[l.scan] += part;
         }
         self.noise.white * white + self.noise.shared * shared.iter().map(|s| s * s).sum::<f64>()
     }

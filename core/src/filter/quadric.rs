@@ -30,8 +30,10 @@ pub(super) struct Fit {
     pub moments: Moments,
 }
 
-/// Reweighting passes; the weights change by less than a per cent after four.
+/// Reweighting passes at most.
 const PASSES: usize = 4;
+/// Weights that change by less in the mean are as they will be.
+const SETTLED: f64 = 0.01;
 /// Tukey's constant: 95 % efficient for normal noise.
 const TUKEY: f64 = 4.685;
 /// Variance of normal numbers under those weights: `E[w x^2] / E[w]`.
@@ -57,10 +59,10 @@ pub(super) fn fit(
             let offset = (m.point - seed) / radius;
             let (a, b) = (offset.dot(&u), offset.dot(&v));
             let near = (1.0 - (a * a + b * b)).max(0.0);
+            let sharp = radius / m.sigma;
             Local {
-                terms: SVector::from([1.0, a, b, a * a, a * b, b * b]),
-                height: offset.dot(normal),
-                sigma: m.sigma / radius,
+                terms: SVector::from([1.0, a, b, a * a, a * b, b * b]) * sharp,
+                height: offset.dot(normal) * sharp,
                 scan: scans.partition_point(|s| *s < m.scan),
                 near,
                 robust: 1.0,
@@ -72,8 +74,11 @@ pub(super) fn fit(
         let equations = Equations::new(&local, scans.len(), noise);
         let factor = equations.factor()?;
         let coefficients = factor.solve(&equations.right);
-        reweight(&mut local, &coefficients, noise, pass == 0);
+        let moved = reweight(&mut local, &coefficients, noise, pass == 0);
         solved = Some((coefficients, equations, factor));
+        if moved < SETTLED {
+            break;
+        }
     }
     let (coefficients, equations, factor) = solved?;
     let slope = u * coefficients[1] + v * coefficients[2];
@@ -81,26 +86,30 @@ pub(super) fn fit(
     Some(Fit {
         point: seed + normal * (coefficients[0] * radius),
         normal: (normal - slope).normalize(),
-        sigma: equations.variance(&factor).sqrt() * radius,
+        sigma: equations.variance(&factor, &local).sqrt() * radius,
         effective: local.iter().map(|l| l.robust).sum(),
         support: spread.support,
         moments: spread.moments,
     })
 }
 
-/// Tukey's weights by residuals in standard deviations.
-fn reweight(local: &mut [Local], coefficients: &Terms, noise: &Components, lenient: bool) {
-    let residual = |l: &Local| (l.height - l.terms.dot(coefficients)).abs() / l.sigma;
-    let mut sizes: Vec<f64> = local.iter().map(residual).collect();
+/// Tukey's weights by residuals in standard deviations. Gives by how much they changed in the mean.
+fn reweight(local: &mut [Local], coefficients: &Terms, noise: &Components, lenient: bool) -> f64 {
+    let sizes: Vec<f64> = local.iter().map(|l| l.residual(coefficients).abs()).collect();
+    let mut ordered = sizes.clone();
     let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median = *ordered.select_nth_unstable_by(middle, f64::total_cmp).1;
     let scale = (1.4826 * median).max(noise.total().sqrt());
     // The first pass may lean on an outlier or another sheet: be lenient, then strict.
     let reach = if lenient { 3.0 } else { 1.0 } * TUKEY * scale;
-    for l in local {
-        let r = residual(l) / reach;
-        l.robust = if r < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 };
+    let mut moved = 0.0;
+    for (l, size) in local.iter_mut().zip(sizes) {
+        let r = size / reach;
+        let robust = if r < 1.0 { (1.0 - r * r).powi(2) } else { 0.0 };
+        moved += (robust - l.robust).abs();
+        l.robust = robust;
     }
+    if lenient { f64::INFINITY } else { moved / local.len() as f64 }
 }
 
 /// How the residuals of the scans spread.
@@ -114,8 +123,8 @@ impl Spread {
     fn new(local: &[Local], scans: usize, coefficients: &Terms) -> Spread {
         let mut sums = vec![[0.0; 4]; scans];
         for l in local {
-            let w = l.near * l.robust;
-            let e = (l.height - l.terms.dot(coefficients)) / (l.sigma * TUKEY_VARIANCE.sqrt());
+            let w = l.weight();
+            let e = l.residual(coefficients) / TUKEY_VARIANCE.sqrt();
             for (sum, value) in sums[l.scan].iter_mut().zip([w, w * w, w * e, w * e * e]) {
                 *sum += value;
             }

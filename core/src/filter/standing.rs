@@ -102,10 +102,10 @@ impl<'a> Explainer<'a> {
         self.cells.for_each_within(&self.cloud.points, &m.point, self.search, |j, _| {
             near.extend(self.aside(m, j).map(|square| (square, j)));
         });
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: Option<Standing> = None;
         for _ in 0..SIDES {
-            let Some(&(_, first)) = near.first() else { break };
+            let nearest = near.iter().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let Some(&(_, first)) = nearest else { break };
             let axis = self.cloud.normals[first];
             let alike = |j: usize| self.cloud.normals[j].dot(&axis) >= ONE_SIDE;
             let standing = self.above(m, near.iter().filter(|(_, j)| alike(*j)));
