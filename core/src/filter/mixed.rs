@@ -109,3 +109,42 @@ impl Equations {
         self.noise.white * white + self.noise.shared * shared.iter().map(|s| s * s).sum::<f64>()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Measurements of a plane, each of unit deviation, by scan: how many and how high.
+    fn flat(scans: &[(usize, f64)]) -> Vec<Local> {
+        let of_scan = |(scan, &(count, height)): (usize, &(usize, f64))| -> Vec<Local> {
+            let at = |i: usize| {
+                let angle = i as f64 * 2.4;
+                let (a, b) = (0.7 * angle.cos(), 0.7 * angle.sin());
+                let terms = SVector::from([1.0, a, b, a * a, a * b, b * b]);
+                Local { terms, height, scan, near: 1.0, robust: 1.0 }
+            };
+            (0..count).map(at).collect()
+        };
+        scans.iter().enumerate().flat_map(of_scan).collect()
+    }
+
+    /// Height of the surface and its variance.
+    fn solved(local: &[Local], scans: usize, noise: Components) -> (f64, f64) {
+        let equations = Equations::new(local, scans, &noise);
+        let factor = equations.factor().unwrap();
+        // In the middle of the ring: half of the height is curvature there.
+        let terms = factor.solve(&equations.right);
+        (terms[0] + 0.49 * (terms[3] + terms[5]) / 2.0, equations.variance(&factor, local))
+    }
+
+    #[test]
+    fn a_scan_with_many_measurements_does_not_outvote_one_with_few() {
+        let local = flat(&[(200, 1.0), (20, -1.0)]);
+        let (white, _) = solved(&local, 2, Components { white: 1.0, shared: 0.0 });
+        let (shared, variance) = solved(&local, 2, Components { white: 1.0, shared: 4.0 });
+        assert!(white > 0.7, "{white}");
+        assert!(shared.abs() < 0.05, "{shared}");
+        // Two offsets of variance 4 leave 2, however many measurements there are; beliefs in flatness only less.
+        assert!(variance < 2.3, "{variance}");
+    }
+}

@@ -60,3 +60,28 @@ impl Neighbours {
         from_surface.max((standing.height - expected).abs() / variance.sqrt())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_lies_where_its_neighbours_do_is_less_off_than_who_does_not() {
+        let noise = Components { white: 0.2, shared: 0.8 };
+        let standing = |x: f64, height: f64| Standing {
+            foot: Vec3::new(x, 0.0, 0.0),
+            normal: Vec3::z(),
+            height,
+            surface: 0.0,
+        };
+        // The whole scan lies two deviations above the surface.
+        let all: Vec<Option<Standing>> =
+            (-20..=20).map(|i| Some(standing(f64::from(i) * 1e-4, 2.0))).collect();
+        let neighbours = Neighbours::new(&all, 2e-3, &noise);
+        let off = |height: f64| neighbours.off(&standing(0.0, height));
+        assert!((off(2.0) - 2.0).abs() < 0.01, "{}", off(2.0));
+        assert!(off(0.0) > 4.0 && off(-2.0) > 8.0, "{} {}", off(0.0), off(-2.0));
+        // Alone it is measured by the surface.
+        assert!((neighbours.off(&standing(1.0, 3.0)) - 3.0).abs() < 0.01);
+    }
+}
