@@ -4,7 +4,6 @@ use super::FilterParams;
 use super::merged::Merged;
 use super::quadric::{Fit, Measured, fit};
 use crate::geometry::{Components, Vec3, median};
-use crate::voxel::CellIndex;
 
 /// Of the measurements near a point that has a surface, at least this share agree with it.
 const LEAST_AGREEMENT: f64 = 0.35;
@@ -29,7 +28,6 @@ const SMALLER: [f64; 2] = [0.6, 0.36];
 /// All that fits share.
 pub(super) struct Fitter<'a> {
     merged: &'a Merged,
-    cells: CellIndex,
     radius: f64,
     /// How far from the seed along the normal a measurement may be that belongs, metres.
     depth: f64,
@@ -46,8 +44,7 @@ impl<'a> Fitter<'a> {
     ) -> Fitter<'a> {
         let usual = median(merged.sigma.iter().map(|s| f64::from(*s)).collect()).unwrap_or(0.0);
         let depth = (DEEP * usual * noise.total().sqrt()).min(radius);
-        let cells = CellIndex::new(&merged.points, radius);
-        Fitter { merged, cells, radius, depth, params, noise }
+        Fitter { merged, radius, depth, params, noise }
     }
 
     /// The surface at the measurement `seed`, if enough agree on one; within a smaller radius where it bends.
@@ -81,7 +78,7 @@ impl<'a> Fitter<'a> {
     fn near(&self, seed: usize) -> Vec<usize> {
         let (points, mut near) = (&self.merged.points, Vec::new());
         let search = self.radius.hypot(self.depth);
-        self.cells.for_each_within(points, &points[seed], search, |i, _| near.push(i));
+        self.merged.cells.for_each_within(points, &points[seed], search, |i, _| near.push(i));
         near
     }
 
@@ -93,12 +90,10 @@ impl<'a> Fitter<'a> {
         let enough = if share < 1.0 { DENSE } else { 1 } * self.params.min_measurements;
         let fit_about = |center: &Vec3, normal: &Vec3| {
             let measured = self.in_cylinder(near, center, normal, radius);
-            let fit = if measured.len() < enough {
-                None
-            } else {
-                fit(&measured, center, normal, radius, &self.noise)
-            };
-            fit.map(|fit| (fit, measured.len()))
+            if measured.len() < enough {
+                return None;
+            }
+            Some((fit(&measured, center, normal, radius, &self.noise)?, measured.len()))
         };
         let (mut fit, mut count) = fit_about(&point, &normal)?;
         if (fit.point - point).norm() > OFF * radius || fit.normal.dot(&normal) < TURNED {

@@ -59,10 +59,9 @@ impl Learnt {
 /// Differences of two scans' measurements of one place, in stated standard deviations over the square root of two: they
 /// hold all that the scans do not share, whatever surface was fitted.
 fn residuals(merged: &Merged, fits: &[Fit], noise_radius: f64) -> Vec<Residual> {
-    let cells = crate::voxel::CellIndex::new(&merged.points, noise_radius);
     let near = |fit: &Fit| {
         let mut found: Vec<Seen> = Vec::new();
-        cells.for_each_within(&merged.points, &fit.point, noise_radius, |i, square| {
+        merged.cells.for_each_within(&merged.points, &fit.point, noise_radius, |i, square| {
             let height = (merged.points[i] - fit.point).dot(&fit.normal);
             let aside = square - height * height;
             if merged.normals[i].dot(&fit.normal) > 0.0 && aside < (NEAR * noise_radius).powi(2) {

@@ -2,6 +2,7 @@
 
 use crate::geometry::{NoiseModel, Pose, Vec3};
 use crate::register::PreparedScan;
+use crate::voxel::CellIndex;
 
 /// No sensor is better, metres.
 pub(super) const LEAST_SIGMA: f32 = 1e-6;
@@ -21,10 +22,12 @@ pub(super) struct Merged {
     pub range: Vec<f32>,
     /// The noise of the sensor that took the scans, as each sees it for itself.
     pub sensor: NoiseModel,
+    /// For searches within about the noise radius.
+    pub cells: CellIndex,
 }
 
 impl Merged {
-    pub(super) fn new(scans: &[(&PreparedScan, Pose)]) -> Merged {
+    pub(super) fn new(scans: &[(&PreparedScan, Pose)], noise_radius: f64) -> Merged {
         let total = scans.iter().map(|(scan, _)| scan.points.len()).sum();
         let mut merged = Merged {
             points: Vec::with_capacity(total),
@@ -34,6 +37,7 @@ impl Merged {
             sigma: Vec::with_capacity(total),
             range: Vec::with_capacity(total),
             sensor: NoiseModel::of_scans(scans.iter().map(|(scan, _)| &scan.model)),
+            cells: CellIndex::new(&[], noise_radius),
         };
         for (index, (scan, pose)) in scans.iter().enumerate() {
             let count = scan.points.len();
@@ -46,6 +50,7 @@ impl Merged {
             merged.range.extend_from_slice(&scan.range);
             merged.sigma.extend(scan.sigma.iter().map(|s| s.max(LEAST_SIGMA)));
         }
+        merged.cells = CellIndex::new(&merged.points, noise_radius);
         if scans.len() > 1 {
             merged.sigma = merged.of_one_sensor();
         }

@@ -79,8 +79,8 @@ pub fn filter(
     progress: &Progress,
 ) -> Result<Filtered> {
     progress.report("filter", 0.0)?;
-    let mut merged = Merged::new(scans);
     let (noise_radius, reduction_radius) = radii(scans, residual, params);
+    let mut merged = Merged::new(scans, noise_radius);
     let noise = Learnt::new(&mut merged, noise_radius, reduction_radius, params);
     let (of_noise, of_reduction) = (noise_radius, reduction_radius);
     let cloud = match params.method {

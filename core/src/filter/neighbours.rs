@@ -36,8 +36,7 @@ impl Neighbours {
     /// How many standard deviations a measurement is off, from the surface or from what it shares with its neighbours (best
     /// prediction of a random offset; Searle, Casella, McCulloch 1992, ch. 7), whichever is more.
     pub(super) fn off(&self, standing: &Standing) -> f64 {
-        let variance = self.noise.total() + standing.surface;
-        let from_surface = standing.height.abs() / variance.sqrt();
+        let from_surface = standing.off(&self.noise);
         let own = f64::from(u8::from(standing.is_on_surface(&self.noise)));
         let (mut sum, mut count) = (-own * standing.height, -own);
         let mut aside = Vec3::zeros();

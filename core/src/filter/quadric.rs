@@ -2,7 +2,7 @@
 //! weights as in iteratively reweighted least squares).
 
 use super::mixed::{Equations, Local, Terms};
-use crate::geometry::{Components, Moments, Vec3, any_orthogonal};
+use crate::geometry::{Components, MAD_TO_SIGMA, Moments, Vec3, any_orthogonal};
 use nalgebra::SVector;
 
 /// One measurement seen by the fit.
@@ -99,7 +99,7 @@ fn reweight(local: &mut [Local], coefficients: &Terms, noise: &Components, lenie
     let mut ordered = sizes.clone();
     let middle = sizes.len() / 2;
     let median = *ordered.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let scale = (1.4826 * median).max(noise.total().sqrt());
+    let scale = (MAD_TO_SIGMA * median).max(noise.total().sqrt());
     // The first pass may lean on an outlier or another sheet: be lenient, then strict.
     let reach = if lenient { 3.0 } else { 1.0 } * TUKEY * scale;
     let mut moved = 0.0;

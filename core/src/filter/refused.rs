@@ -63,11 +63,11 @@ struct Judged {
 /// they are taken for normal numbers whose scale follows from how many lie near the surface, where outliers are few (empirical
 /// null; Efron 2010, Large-scale inference, ch. 6).
 fn reach_of_aside(judged: &[Vec<Judged>]) -> f64 {
-    let count = |low: f64, high: f64| {
-        let aside = judged.iter().flatten().filter(|j| !j.oriented);
-        aside.filter(|j| j.off >= low && j.off < high).count() as f64
-    };
-    let outliers = judged.iter().flatten().filter(|j| !j.oriented && j.off >= SURELY_OUT).count();
+    let aside = judged.iter().flatten().filter(|j| !j.oriented);
+    let off: Vec<f64> = aside.map(|j| j.off).collect();
+    let count =
+        |low: f64, high: f64| off.iter().filter(|off| (low..high).contains(*off)).count() as f64;
+    let outliers = off.iter().filter(|off| **off >= SURELY_OUT).count();
     // The logarithm of the normal density falls by x^2 / 2; the middles of both counts are 1/2 and 3/2.
     let fall = (count(0.0, 1.0).max(1.0) / count(1.0, 2.0).max(1.0)).ln();
     let scale = if fall > 0.0 { fall.powf(-0.5).max(1.0) } else { f64::INFINITY };

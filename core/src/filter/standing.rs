@@ -60,9 +60,14 @@ pub(super) struct Standing {
 }
 
 impl Standing {
+    /// How many standard deviations the measurement is off the surface.
+    pub(super) fn off(&self, noise: &Components) -> f64 {
+        self.height.abs() / (noise.total() + self.surface).sqrt()
+    }
+
     /// Whether it may belong to the surface.
     pub(super) fn is_on_surface(&self, noise: &Components) -> bool {
-        self.height * self.height <= REACH * REACH * (noise.total() + self.surface)
+        self.off(noise) <= REACH
     }
 }
 

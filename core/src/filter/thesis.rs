@@ -29,11 +29,10 @@ pub(super) fn filter(
     let normals: Vec<Option<Vec3>> =
         (0..points.len()).into_par_iter().map(|i| normal(merged, &tree, i)).collect();
     progress.report("filter", 0.3)?;
-    let cells = CellIndex::new(points, noise_radius);
     let cosine = params.max_normal_angle.cos();
     let expected: Vec<Option<Expected>> = (0..points.len())
         .into_par_iter()
-        .map(|i| expected(merged, &normals, &cells, i, noise_radius, cosine))
+        .map(|i| expected(merged, &normals, i, noise_radius, cosine))
         .collect();
     progress.report("filter", 0.8)?;
     Ok(reduce(points, &normals, &expected, reduction_radius, params.min_measurements))
@@ -63,7 +62,6 @@ struct Expected {
 fn expected(
     merged: &Merged,
     normals: &[Option<Vec3>],
-    cells: &CellIndex,
     index: usize,
     noise_radius: f64,
     cosine: f64,
@@ -71,7 +69,7 @@ fn expected(
     let (p, n) = (merged.points[index], normals[index]?);
     let (mut sum, mut squares, mut similar) = (0.0, 0.0, 0);
     let mut scans: Vec<u16> = Vec::new();
-    cells.for_each_within(&merged.points, &p, noise_radius, |i, _| {
+    merged.cells.for_each_within(&merged.points, &p, noise_radius, |i, _| {
         let offset = merged.points[i] - p;
         let height = offset.dot(&n);
         let aside = (offset - n * height).norm();

@@ -1,5 +1,8 @@
 //! The median.
 
+/// Factor from the median absolute deviation of normally distributed values to their standard deviation.
+pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
+
 /// Median; `None` of nothing.
 pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;

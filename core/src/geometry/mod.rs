@@ -15,7 +15,7 @@ pub use aabb::Aabb;
 pub use cloud::{Cloud, Scan};
 pub use fit::{PlaneFit, any_orthogonal, fit_plane};
 pub use kdtree::KdTree;
-pub(crate) use median::median;
+pub(crate) use median::{MAD_TO_SIGMA, median};
 pub use noise::{Components, Moments, NoiseModel, Residual};
 pub use pose::{
     Mat6, Pose, Twist, adjoint, exp, log, pose_from_rows, pose_to_rows, rigid_fit, skew,

@@ -5,7 +5,7 @@
 //! with 1 / cos of the incidence), and how much of the variance neighbours in a scan share (components of
 //! variance; Searle, Casella, McCulloch 1992, ch. 3, method of moments).
 
-use super::median;
+use super::{MAD_TO_SIGMA, median};
 use nalgebra::{Matrix3, Vector3};
 
 /// Cosines below this count as this: what is seen at a more grazing angle scatters no further.
@@ -18,8 +18,6 @@ const LEAST_RESIDUALS: usize = 40;
 const BELIEF: f64 = 50.0;
 /// Largest powers of range and of 1 / cos believed of a sensor; of the ratio of two, negative ones as well.
 const POWERS: [f64; 2] = [3.0, 2.0];
-/// Standard deviation of normal noise over the median of its absolute value.
-const MAD: f64 = 1.4826;
 
 /// The distance of one measurement from the surface near it.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +100,7 @@ impl NoiseModel {
             let row = Vector3::new(1.0, (range / at_range).ln(), -cosine.ln());
             let weight = class.0.len() as f64;
             matrix += row * row.transpose() * weight;
-            right += row * (weight * (MAD * distance).ln());
+            right += row * (weight * (MAD_TO_SIGMA * distance).ln());
         }
         matrix[(1, 1)] += BELIEF;
         matrix[(2, 2)] += BELIEF;
@@ -112,7 +110,7 @@ impl NoiseModel {
             NoiseModel { sigma: 1.0, at_range, range_power: power(0), slant_power: power(1) };
         // The level again, with the powers as they are now.
         let relative = |r: &Residual| r.distance.abs() / model.at(r.range, r.cosine);
-        model.sigma = MAD * median(residuals.iter().map(relative).collect())?;
+        model.sigma = MAD_TO_SIGMA * median(residuals.iter().map(relative).collect())?;
         (model.sigma > 0.0).then_some(model)
     }
 }

@@ -95,9 +95,13 @@ impl<T: Copy + Default> BlockGrid<T> {
 
     /// The slot of `voxel`; `None` outside the box.
     pub fn slot(&self, voxel: Voxel) -> Option<u32> {
-        // A point far off has a voxel at the end of the numbers.
-        let local = [0, 1, 2].map(|i| voxel[i].saturating_sub(self.low[i]));
+        let local = self.local(voxel);
         (0..3).all(|i| (0..self.size[i]).contains(&local[i])).then(|| self.slot_of_local(local))
+    }
+
+    /// The voxel counted from the lowest of the box. A point far off has a voxel at the end of the numbers.
+    fn local(&self, voxel: Voxel) -> Voxel {
+        [0, 1, 2].map(|i| voxel[i].saturating_sub(self.low[i]))
     }
 
     /// The slot of the voxel that holds `point`; `None` outside the box.
@@ -175,10 +179,8 @@ impl<T: Copy + Default> BlockGrid<T> {
             }
         }
         let start = origin + direction * from;
-        let local = [0, 1, 2].map(|i| {
-            let voxel = ((start[i] / self.edge).floor() as i32).saturating_sub(self.low[i]);
-            voxel.clamp(0, self.size[i] - 1)
-        });
+        let local = self.local(voxel_of(&start, self.edge));
+        let local = [0, 1, 2].map(|i| local[i].clamp(0, self.size[i] - 1));
         let step = [0, 1, 2].map(|i| direction[i].partial_cmp(&0.0).map_or(0, |o| o as i32));
         let next = [0, 1, 2].map(|i| {
             let border = f64::from(self.low[i] + local[i] + i32::from(step[i] > 0)) * self.edge;

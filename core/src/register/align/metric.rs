@@ -8,8 +8,7 @@
 
 use super::Moving;
 use super::matching::Correspondence;
-use super::weighting::MAD_TO_SIGMA;
-use crate::geometry::{Mat6, Pose, Twist, median};
+use crate::geometry::{MAD_TO_SIGMA, Mat6, Pose, Twist, median};
 use crate::register::factors::{combined_information, point_to_plane, point_to_point};
 use crate::register::{Method, RegisterParams};
 

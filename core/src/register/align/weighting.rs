@@ -3,7 +3,7 @@
 
 use super::Moving;
 use super::matching::Correspondence;
-use crate::geometry::median;
+use crate::geometry::{MAD_TO_SIGMA, median};
 use crate::register::factors::tukey;
 
 crate::choice! {
@@ -52,8 +52,6 @@ impl Kernel {
     }
 }
 
-/// Factor from the median absolute deviation of normally distributed values to their standard deviation.
-pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
 /// Standard deviations at which a weight of [`Weight::Mad`] ends.
 const MAD_WIDTH: f64 = 3.0;
 
