@@ -12,6 +12,7 @@ mod equations;
 mod evidence;
 mod factors;
 mod joint;
+mod layers;
 mod pair;
 mod place;
 mod prepare;
@@ -81,7 +82,7 @@ crate::params! {
         max_normal_angle: f64 = 0.785, in [0.0, 3.15], unit "rad";
         /// A scan with fewer correspondences is put aside.
         min_correspondences: usize = 100, in [6, 1000000];
-        /// A scan of which a smaller share finds correspondences is put aside.
+        /// A scan of which a smaller share lies on the map is put aside.
         min_overlap: f64 = 0.1, in [0.0, 1.0];
         /// Points sampled from each scan.
         samples: usize = 2000, in [50, 1000000];

@@ -2,6 +2,7 @@
 
 use super::align::{Alignment, Map, Prior, Radius, align};
 use super::evidence::Evidence;
+use super::layers::doubled;
 use super::rivals::Rivals;
 use super::sample::Sample;
 use super::verdict::{Status, Verdict};
@@ -42,6 +43,9 @@ pub(crate) fn place(
     if verdict.status != Status::Accepted {
         return (pose, verdict);
     }
+    if let Some(share) = doubled(sample, map, &pose, radius.end) {
+        return (pose, verdict.unless(Some(layered(share, radius.end))));
+    }
     let rivals = Rivals { sample, map, prior, radius, params };
     let ambiguous = rivals.of(&pose, &verdict.covariance).map(|rival| {
         let apart = sample.displacement(&pose, &rival.pose) * 1e3;
@@ -49,6 +53,14 @@ pub(crate) fn place(
         format!("ambiguous: a pose {apart:.1} mm away fits {how}")
     });
     (pose, verdict.unless(ambiguous))
+}
+
+fn layered(share: f64, reach: f64) -> String {
+    format!(
+        "{:.0} % of the points form a second layer more than {:.1} mm from the map's: another object, or not this pose",
+        share * 100.0,
+        reach * 1e3
+    )
 }
 
 fn radius(sample: &Sample, prior: &Mat6, noise: f64, params: &RegisterParams) -> Radius {

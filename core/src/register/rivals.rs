@@ -19,7 +19,7 @@ const OFFSET: f64 = 1.5;
 /// Every so many of a scan's points take part: a rival need not be found exactly.
 const STRIDE: usize = 4;
 /// A pose that brings at least this share of the result's points onto the surface fits about as well.
-const AS_GOOD: f64 = 0.85;
+const AS_GOOD: f64 = 0.8;
 /// One that brings so much more is better.
 const BETTER: f64 = 1.2;
 /// Mahalanobis distance within which two poses are the same.

@@ -75,11 +75,12 @@ impl Verdict {
     ) -> Verdict {
         let overlap = alignment.correspondences as f64 / sampled.max(1) as f64;
         let free = free_directions(&alignment.information, &prior.information);
-        let problem = problem(alignment, prior, overlap, expected, params);
+        let fitness = overlap * (expected / alignment.rmse.max(expected)).min(1.0);
+        let problem = problem(alignment, prior, fitness, expected, params);
         Verdict {
             status: if problem.is_some() { Status::Deferred } else { Status::Accepted },
             reason: problem.unwrap_or_else(|| aligned(free.len())),
-            fitness: overlap * (expected / alignment.rmse.max(expected)).min(1.0),
+            fitness,
             overlap,
             rmse: alignment.rmse,
             correspondences: alignment.correspondences,
@@ -108,7 +109,7 @@ fn aligned(free: usize) -> String {
 fn problem(
     alignment: &Alignment,
     prior: &Prior,
-    overlap: f64,
+    fitness: f64,
     expected: f64,
     params: &RegisterParams,
 ) -> Option<String> {
@@ -121,24 +122,24 @@ fn problem(
     if params.method == Method::Thesis {
         return None;
     }
-    if overlap < params.min_overlap {
-        return Some(format!(
-            "overlap {:.0} %, {:.0} % is needed",
-            overlap * 100.0,
-            params.min_overlap * 100.0
-        ));
-    }
     if !alignment.converged {
         return Some(format!("did not converge in {} iterations", params.max_iterations));
     }
     if let Some(far) = correction(&alignment.pose, prior, params) {
         return Some(far);
     }
-    (alignment.rmse > params.max_residual * expected).then(|| {
-        format!(
+    if alignment.rmse > params.max_residual * expected {
+        return Some(format!(
             "residual {:.2} mm where noise explains {:.2} mm",
             alignment.rmse * 1e3,
             expected * 1e3
+        ));
+    }
+    (fitness < params.min_overlap).then(|| {
+        format!(
+            "{:.0} % of the points lie on the map, {:.0} % is needed",
+            fitness * 100.0,
+            params.min_overlap * 100.0
         )
     })
 }

@@ -19,7 +19,7 @@ mod selection;
 mod weighting;
 
 pub(crate) use boundary::boundary;
-pub(crate) use map::{Map, Surface};
+pub(crate) use map::{Map, Surface, Target};
 pub use matching::Matching;
 pub(crate) use matching::{Correspondence, Matcher};
 pub use rejection::Rejection;
