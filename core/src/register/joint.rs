@@ -9,7 +9,7 @@
 use super::correlation::{Correlation, Residuals};
 use super::equations::{Row, reduced};
 use super::sample::Sample;
-use super::surfels::{Surfels, Term};
+use super::surfels::{OnSurfel, Surfels, Term, terms};
 use super::verdict::Status;
 use super::whiten::{WhiteRow, whiten};
 use super::{RegisterParams, Registration};
@@ -167,17 +167,17 @@ impl Measured {
             scans.iter().copied().zip(poses.iter().copied()).collect();
         let surfels = Surfels::new(&views, at.edge, cosine);
         let floor = median(scans.iter().map(|s| s.noise).collect()).unwrap_or(1e-6) / 2.0;
+        let met: Vec<Vec<OnSurfel>> = views
+            .par_iter()
+            .map(|(sample, pose)| surfels.met(sample, pose, at.reach, cosine))
+            .collect();
         let look = |scale: f64| -> Vec<Vec<Term>> {
-            views
-                .par_iter()
-                .map(|(sample, pose)| surfels.terms(sample, pose, at.reach, scale, cosine))
-                .collect()
+            met.par_iter().map(|met| terms(met, scale)).collect()
         };
         let count = surfels.centers.len();
         // First everything in reach, to learn how large the residuals are.
-        let mut terms = look(at.reach);
-        let scale = spread(&terms, count).max(floor);
-        terms = look(scale);
+        let scale = spread(&look(at.reach), count).max(floor);
+        let mut terms = look(scale);
         let heights = heights(&terms, count);
         let (between, within) = variances(&terms, &heights, floor);
         let redundant = deviations(&terms, &heights).count();

@@ -9,7 +9,7 @@ use super::sample::Sample;
 use crate::geometry::Pose;
 
 /// Points that are looked at.
-const POINTS: usize = 400;
+const POINTS: usize = 300;
 /// Layers are looked for up to so many times the distance within which a point lies on the surface: farther off there may
 /// be other parts of the object.
 const FAR: f64 = 4.0;
@@ -29,6 +29,7 @@ pub(crate) fn doubled(sample: &Sample, map: &Map, pose: &Pose, reach: f64) -> Op
         let point = pose.rotation * sample.points[i] + pose.translation.vector;
         let normal = pose.rotation * sample.normals[i];
         let faces_alike = |t: &Target| t.normal.dot(&normal) > ALIKE;
+        map.nearest_within(&point, FAR * reach + step)?;
         // Outwards, because the other side of a thin wall may be nearer than the side that faces alike.
         let heights = (0..).map(|k| f64::from(k) * step).take_while(|h| *h < FAR * reach);
         let layer = |h: f64| {

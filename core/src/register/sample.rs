@@ -1,6 +1,6 @@
 //! One scan made ready for registration.
 
-use super::align::{Map, Moving, Rejection, Surface, boundary, select};
+use super::align::{Map, Moving, Rejection, Surface, Thinned, boundary, select};
 use super::factors::point_motion;
 use super::{PreparedScan, RegisterParams};
 use crate::geometry::{Aabb, Mat6, Pose, Vec3, median};
@@ -64,8 +64,7 @@ impl Sample {
 
     /// Every `stride`-th of the points.
     pub(crate) fn every(&self, stride: usize) -> Thinned {
-        let take = |of: &[Vec3]| of.iter().copied().step_by(stride).collect();
-        Thinned { points: take(&self.points), normals: take(&self.normals), rays: take(&self.rays) }
+        self.moving(self.noise).every(stride)
     }
 
     /// The map of the targets of `scans`, each seen from its pose.
@@ -116,20 +115,6 @@ impl Sample {
     /// Radius within which an aligned point finds its surface, with residuals of deviation `noise` (metres).
     pub(crate) fn reach(&self, noise: f64) -> f64 {
         (3.0 * self.target_spacing).max(4.0 * noise)
-    }
-}
-
-/// Some of a scan's points.
-pub(crate) struct Thinned {
-    points: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    rays: Vec<Vec3>,
-}
-
-impl Thinned {
-    /// As what is aligned, with residuals of deviation `noise` (metres).
-    pub(crate) fn moving(&self, noise: f64) -> Moving<'_> {
-        Moving { points: &self.points, normals: &self.normals, rays: &self.rays, noise }
     }
 }
 

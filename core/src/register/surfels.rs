@@ -45,9 +45,8 @@ struct Measurement {
 }
 
 /// A measurement and the surfel that it belongs to; see [`Term`].
-struct OnSurfel {
+pub(crate) struct OnSurfel {
     surfel: u32,
-    weight: f64,
     residual: f64,
     jacobian: Twist,
     at: Vec3,
@@ -144,50 +143,52 @@ impl Surfels {
         (slope < -GRAZING).then(|| ray.point - ray.direction * (height / slope))
     }
 
-    /// What `sample`, seen from `pose`, measured of each surfel, ascending. Residuals are believed up to some
-    /// `scale` (metres, a standard deviation).
-    pub(crate) fn terms(
+    /// The points of `sample`, seen from `pose`, that lie within `reach` (metres) of a surfel, by surfel, ascending.
+    pub(crate) fn met(
         &self,
         sample: &Sample,
         pose: &Pose,
         reach: f64,
-        scale: f64,
         cosine: f64,
-    ) -> Vec<Term> {
-        let mut found: Vec<OnSurfel> = Vec::new();
-        let stride = sample.targets.len().div_ceil(POINTS).max(1);
-        for i in (0..sample.targets.len()).step_by(stride) {
+    ) -> Vec<OnSurfel> {
+        let meets = |i: usize| {
             let ray = Measurement {
                 point: pose.rotation * sample.targets[i] + pose.translation.vector,
                 normal: pose.rotation * sample.target_normals[i],
                 direction: pose.rotation * sample.target_rays[i],
             };
-            let Some((index, residual, foot)) = self.met_by(&ray, reach, cosine) else { continue };
-            let weight = tukey(residual / scale);
-            if weight > 0.0 {
-                // The derivative where the surface is: at the measured point it would hold the noise once more.
-                let seen =
-                    pose.rotation.inverse_transform_vector(&(foot - pose.translation.vector));
-                let (center, normal) = (&self.centers[index], &self.normals[index]);
-                let (_, jacobian) = point_to_plane(pose, &seen, center, normal);
-                found.push(OnSurfel { surfel: index as u32, weight, residual, jacobian, at: seen });
-            }
-        }
+            let (index, residual, foot) = self.met_by(&ray, reach, cosine)?;
+            // The derivative where the surface is: at the measured point it would hold the noise once more.
+            let at = pose.rotation.inverse_transform_vector(&(foot - pose.translation.vector));
+            let (_, jacobian) =
+                point_to_plane(pose, &at, &self.centers[index], &self.normals[index]);
+            Some(OnSurfel { surfel: index as u32, residual, jacobian, at })
+        };
+        let stride = sample.targets.len().div_ceil(POINTS).max(1);
+        let mut found: Vec<OnSurfel> =
+            (0..sample.targets.len()).step_by(stride).filter_map(meets).collect();
         found.sort_by_key(|on| on.surfel);
-        found.chunk_by(|a, b| a.surfel == b.surfel).filter_map(mean).collect()
+        found
     }
 }
 
+/// What a scan measured of each surfel, ascending, of points that lie on them. Residuals are believed up to some `scale`
+/// (metres, a standard deviation).
+pub(crate) fn terms(met: &[OnSurfel], scale: f64) -> Vec<Term> {
+    met.chunk_by(|a, b| a.surfel == b.surfel).filter_map(|of| mean(of, scale)).collect()
+}
+
 /// The mean of one scan's measurements of one surfel.
-fn mean(found: &[OnSurfel]) -> Option<Term> {
+fn mean(found: &[OnSurfel], scale: f64) -> Option<Term> {
     let (mut weight, mut residual, mut square) = (0.0, 0.0, 0.0);
     let (mut jacobian, mut at) = (Twist::zeros(), Vec3::zeros());
     for on in found {
-        weight += on.weight;
-        residual += on.weight * on.residual;
-        square += on.weight * on.residual * on.residual;
-        jacobian += on.jacobian * on.weight;
-        at += on.at * on.weight;
+        let robust = tukey(on.residual / scale);
+        weight += robust;
+        residual += robust * on.residual;
+        square += robust * on.residual * on.residual;
+        jacobian += on.jacobian * robust;
+        at += on.at * robust;
     }
     residual /= weight;
     (weight >= LEAST_WEIGHT).then_some(Term {
@@ -264,7 +265,8 @@ mod tests {
             .collect();
         let centers = normals.iter().map(|n| center + n * RADIUS).collect();
         let surfels = Surfels::of(centers, normals, 8e-3);
-        let terms = surfels.terms(&sample, &Pose::identity(), 8e-3, 8e-3, 0.5);
+        let met = surfels.met(&sample, &Pose::identity(), 8e-3, 0.5);
+        let terms = terms(&met, 8e-3);
         let outline = terms.iter().filter(|t| {
             let ray = surfels.centers[t.surfel as usize].normalize();
             (-surfels.normals[t.surfel as usize].dot(&ray)).acos().to_degrees() > 55.0

@@ -100,8 +100,14 @@ impl Map {
 
     /// The nearest point within `radius` (metres) of `query` (object frame).
     pub(crate) fn nearest_within(&self, query: &Vec3, radius: f64) -> Option<Target> {
-        let (i, _) = self.tree.nearest_within(query, radius)?;
-        Some(Target { point: self.points[i], normal: self.normals[i], boundary: self.boundary[i] })
+        self.nearest(query).filter(|(_, distance)| *distance <= radius).map(|(target, _)| target)
+    }
+
+    /// The nearest point to `query` (object frame) and its distance, metres.
+    pub(crate) fn nearest(&self, query: &Vec3) -> Option<(Target, f64)> {
+        let (i, square) = self.tree.nearest(query)?;
+        let (point, normal, boundary) = (self.points[i], self.normals[i], self.boundary[i]);
+        Some((Target { point, normal, boundary }, square.sqrt()))
     }
 }
 

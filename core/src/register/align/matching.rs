@@ -57,26 +57,39 @@ pub(crate) struct Matcher<'a> {
     matching: Matching,
     /// Over the scan's points, where they have to be found back.
     back: Option<KdTree>,
+    /// Where each point was last, and how far from the map, metres.
+    last: Vec<(Vec3, f64)>,
 }
 
 impl<'a> Matcher<'a> {
     pub(crate) fn new(moving: Moving<'a>, map: &'a Map, params: &RegisterParams) -> Matcher<'a> {
         let matching = params.stages().matching;
         let back = (matching == Matching::Mutual).then(|| KdTree::new(moving.points));
-        Matcher { moving, map, matching, back }
+        // Nothing is known yet: anything may be near.
+        let last = vec![(Vec3::zeros(), f64::NEG_INFINITY); moving.points.len()];
+        Matcher { moving, map, matching, back, last }
     }
 
     /// Pairs of the scan's points at `pose` and the map's within `reach` (metres), in the order of the points.
-    pub(crate) fn find(&self, pose: &Pose, reach: f64) -> Vec<Correspondence> {
-        let at = |i: usize| self.pair(i, pose, reach);
-        (0..self.moving.points.len()).into_par_iter().filter_map(at).collect()
+    pub(crate) fn find(&mut self, pose: &Pose, reach: f64) -> Vec<Correspondence> {
+        let mut last = std::mem::take(&mut self.last);
+        let at = |(i, last): (usize, &mut (Vec3, f64))| self.pair(i, last, pose, reach);
+        let found = last.par_iter_mut().enumerate().filter_map(at).collect();
+        self.last = last;
+        found
     }
 
-    fn pair(&self, index: usize, pose: &Pose, reach: f64) -> Option<Correspondence> {
+    fn pair(
+        &self,
+        index: usize,
+        last: &mut (Vec3, f64),
+        pose: &Pose,
+        reach: f64,
+    ) -> Option<Correspondence> {
         let point = self.moving.points[index];
         let moved = pose.rotation * point + pose.translation.vector;
         let found = match self.matching {
-            Matching::Closest => self.map.nearest_within(&moved, reach)?,
+            Matching::Closest => self.closest(last, &moved, reach)?,
             Matching::Mutual => self.mutual(index, &moved, pose, reach)?,
             Matching::Projective => {
                 self.along_ray(&moved, &(pose.rotation * self.moving.rays[index]), reach)?
@@ -98,6 +111,17 @@ impl<'a> Matcher<'a> {
             gap: between.norm(),
             boundary: found.boundary,
         })
+    }
+
+    /// A point came no nearer to the map than it moved: most of those that are far off need no search, which would take
+    /// longest for them.
+    fn closest(&self, last: &mut (Vec3, f64), moved: &Vec3, reach: f64) -> Option<Target> {
+        if last.1 - (moved - last.0).norm() > reach {
+            return None;
+        }
+        let (target, distance) = self.map.nearest(moved)?;
+        *last = (*moved, distance);
+        (distance <= reach).then_some(target)
     }
 
     fn mutual(&self, index: usize, moved: &Vec3, pose: &Pose, reach: f64) -> Option<Target> {
@@ -191,5 +215,24 @@ pub(crate) mod tests {
         let mutual = found(Matching::Mutual, &points);
         assert_eq!(mutual.iter().map(|c| c.index).collect::<Vec<_>>(), [1]);
         assert_eq!(found(Matching::Closest, &points).len(), 2);
+    }
+
+    #[test]
+    fn what_was_far_off_is_found_again_when_it_has_come_near() {
+        let points: Vec<Vec3> =
+            (0..60).map(|i| Vec3::new(f64::from(i % 7), 0.0, f64::from(i) / 3.0)).collect();
+        let normals = vec![Vec3::z(); points.len()];
+        let moving = Moving { points: &points, normals: &normals, rays: &normals, noise: 0.01 };
+        let (map, params) = (plate(), RegisterParams::default());
+        let mut matcher = Matcher::new(moving, &map, &params);
+        for (height, reach) in [(5.0, 6.0), (4.0, 5.0), (-9.0, 3.0), (-8.5, 4.0), (0.0, 2.0)] {
+            let pose = Pose::translation(0.3, 0.0, height);
+            let indices = |matcher: &mut Matcher| -> Vec<usize> {
+                matcher.find(&pose, reach).iter().map(|c| c.index).collect()
+            };
+            let anew = indices(&mut Matcher::new(moving, &map, &params));
+            assert!(!anew.is_empty());
+            assert_eq!(indices(&mut matcher), anew);
+        }
     }
 }

@@ -84,6 +84,26 @@ impl<'a> Moving<'a> {
             noise: self.noise,
         }
     }
+
+    /// Every `stride`-th of the points.
+    pub(crate) fn every(&self, stride: usize) -> Thinned {
+        let take = |of: &[Vec3]| of.iter().copied().step_by(stride).collect();
+        Thinned { points: take(self.points), normals: take(self.normals), rays: take(self.rays) }
+    }
+}
+
+/// Some of a scan's points.
+pub(crate) struct Thinned {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    rays: Vec<Vec3>,
+}
+
+impl Thinned {
+    /// As what is aligned, with residuals of deviation `noise` (metres).
+    pub(crate) fn moving(&self, noise: f64) -> Moving<'_> {
+        Moving { points: &self.points, normals: &self.normals, rays: &self.rays, noise }
+    }
 }
 
 /// What is believed of the pose before the scan is looked at.
@@ -113,9 +133,13 @@ pub(crate) struct Alignment {
 
 /// The radius shrinks to its end by this factor an iteration: slow enough to follow the alignment.
 const SHRINK: f64 = 0.75;
+/// As many points find the way.
+const SCOUTS: usize = 500;
 /// A step below this many standard deviations of the pose does not matter any more.
 const SMALL_STEP: f64 = 0.1;
 
+/// Aligns `moving` to the map from where the prior believes it. Some of the points find the way, if there are many; then all
+/// of them say where exactly.
 pub(crate) fn align(
     moving: &Moving,
     map: &Map,
@@ -123,9 +147,28 @@ pub(crate) fn align(
     radius: Radius,
     params: &RegisterParams,
 ) -> Alignment {
+    let stride = moving.points.len() / SCOUTS;
+    if stride < 2 || params.method == Method::Thesis {
+        return descend(moving, map, prior, &prior.pose, radius, params);
+    }
+    let scouts = moving.every(stride);
+    let found = descend(&scouts.moving(moving.noise), map, prior, &prior.pose, radius, params);
+    let near = Radius { start: radius.end, end: radius.end };
+    descend(moving, map, prior, &found.pose, near, params)
+}
+
+/// From `start` to where the prior and the pairs within the shrinking radius agree.
+fn descend(
+    moving: &Moving,
+    map: &Map,
+    prior: &Prior,
+    start: &Pose,
+    radius: Radius,
+    params: &RegisterParams,
+) -> Alignment {
     let thesis = params.method == Method::Thesis;
     let mut rounds = Rounds::new(*moving, map, params);
-    let mut pose = prior.pose;
+    let mut pose = *start;
     let mut reach = radius.start;
     let mut converged = false;
     let mut system = rounds.next(&pose, reach);
