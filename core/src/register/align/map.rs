@@ -9,10 +9,12 @@ use crate::voxel::{Voxel, voxel_of};
 use rustc_hash::FxHashMap;
 
 /// Oriented points in the object frame that scans are aligned to: at most one a voxel and side, so that the map
-/// grows with the surface, not with the number of scans.
+/// grows with the surface, not with the number of scans. It is the mean of what the scans saw there when the tree was
+/// built: their noise makes fewer places where a scan may come to rest wrongly.
 pub(crate) struct Map {
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
+    seen: Vec<Seen>,
     /// Whether the point lies at the border of all scans that saw its voxel.
     boundary: Vec<bool>,
     voxel: f64,
@@ -29,6 +31,13 @@ pub(crate) struct Surface<'a> {
     pub boundary: &'a [bool],
 }
 
+/// Sums over what was seen of a voxel's side.
+struct Seen {
+    point: Vec3,
+    normal: Vec3,
+    count: f64,
+}
+
 /// A point of the map.
 #[derive(Clone, Copy)]
 pub(crate) struct Target {
@@ -43,6 +52,7 @@ impl Map {
         Map {
             points: Vec::new(),
             normals: Vec::new(),
+            seen: Vec::new(),
             boundary: Vec::new(),
             voxel,
             taken: FxHashMap::default(),
@@ -64,19 +74,25 @@ impl Map {
         for (surface, pose) in surfaces {
             map.take(&surface, pose);
         }
-        map.tree = KdTree::new(&map.points);
+        map.build();
         map
     }
 
     /// Adds oriented points (sensor frame) seen from `pose`. Returns how many points were built into the tree.
     pub(crate) fn insert(&mut self, surface: &Surface, pose: &Pose) -> usize {
-        let known = self.points.len();
         self.take(surface, pose);
-        if self.points.len() == known {
+        if self.seen.len() == self.points.len() {
             return 0;
         }
-        self.tree = KdTree::new(&self.points);
+        self.build();
         self.points.len()
+    }
+
+    fn build(&mut self) {
+        self.points = self.seen.iter().map(|s| s.point / s.count).collect();
+        // Of one side of a cube, normals do not cancel.
+        self.normals = self.seen.iter().map(|s| s.normal.normalize()).collect();
+        self.tree = KdTree::new(&self.points);
     }
 
     /// Adds points that the tree does not know yet.
@@ -86,13 +102,16 @@ impl Map {
             let boundary = surface.boundary.get(i).copied().unwrap_or(false);
             // The six sides of a cube are enough to keep the faces of a thin wall apart.
             let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
-            let next = self.points.len() as u32;
+            let next = self.seen.len() as u32;
             let index = *self.taken.entry((voxel_of(&point, self.voxel), side)).or_insert(next);
             if index == next {
-                self.points.push(point);
-                self.normals.push(normal);
+                self.seen.push(Seen { point, normal, count: 1.0 });
                 self.boundary.push(boundary);
             } else {
+                let seen = &mut self.seen[index as usize];
+                seen.point += point;
+                seen.normal += normal;
+                seen.count += 1.0;
                 self.boundary[index as usize] &= boundary;
             }
         }
