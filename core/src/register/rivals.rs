@@ -1,8 +1,8 @@
 //! Other poses that fit as well: ribs, teeth and corners repeat themselves.
 //!
 //! Starts are spread over what the prior allows, one to either side along each of its axes. A start that comes to rest
-//! elsewhere, at a pose that the result's covariance does not explain, and fits about as well, makes the result
-//! ambiguous.
+//! elsewhere, at a pose that the result's covariance does not explain, and is not much less likely, makes the result
+//! ambiguous: more points on the surface speak for a pose, a distance from where the prior believes it against.
 
 use super::RegisterParams;
 use super::align::{Map, Moving, Prior, Radius, align, correspondences};
@@ -18,14 +18,14 @@ const CERTAIN: f64 = 0.05;
 const OFFSET: f64 = 1.5;
 /// Every so many of a scan's points take part: a rival need not be found exactly.
 const STRIDE: usize = 4;
-/// A pose that brings at least this share of the result's points onto the surface fits about as well.
-const AS_GOOD: f64 = 0.8;
-/// One that brings so much more is better.
-const BETTER: f64 = 1.2;
+/// What the points say counts like so many independent measurements: neighbours share their noise.
+const INDEPENDENT: f64 = 20.0;
+/// From these odds against the result a pose is as good; from the inverse on it is better.
+const ODDS: f64 = 0.04;
 /// Mahalanobis distance within which two poses are the same.
 const SAME: f64 = 5.0;
 
-/// A pose that fits about as well as the result, or better.
+/// A pose that is about as good as the result, or better.
 pub(crate) struct Rival {
     pub pose: Pose,
     pub better: bool,
@@ -52,21 +52,23 @@ impl Rivals<'_> {
         let thin = sample.every(STRIDE);
         let moving = thin.moving(noise);
         let near = 3.0 * noise;
-        let fit = |pose: &Pose| {
+        let likelihood = |pose: &Pose| {
             let matched = correspondences(&moving, self.map, pose, self.radius.end, self.params);
-            matched.iter().filter(|c| c.distance.abs() < near).count() as f64
+            let fit = matched.iter().filter(|c| c.distance.abs() < near).count() as f64;
+            INDEPENDENT * fit.ln() - 0.5 * self.off(pose).powi(2)
         };
         let at_rest = |start: &Pose| {
             let pose = self.released(&moving, start);
             let apart = log(&(found.inverse() * pose));
             let other = apart.dot(&(certain * apart)).sqrt() > SAME
                 && sample.displacement(found, &pose) > 2.0 * self.radius.end;
-            (self.allows(&pose) && other).then(|| (pose, fit(&pose)))
+            let allowed = self.off(&pose) < chi(self.params.max_correction);
+            (allowed && other).then(|| (pose, likelihood(&pose)))
         };
         let tried: Vec<Option<(Pose, f64)>> = self.starts().par_iter().map(at_rest).collect();
         let best = tried.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let here = fit(found);
-        (best.1 >= AS_GOOD * here).then_some(Rival { pose: best.0, better: best.1 > BETTER * here })
+        let odds = (best.1 - likelihood(found)).exp();
+        (odds >= ODDS).then_some(Rival { pose: best.0, better: odds > 1.0 / ODDS })
     }
 
     /// Where the scan comes to rest from `start`, held loosely there.
@@ -75,9 +77,10 @@ impl Rivals<'_> {
         align(moving, self.map, &loose, self.radius, self.params).pose
     }
 
-    fn allows(&self, pose: &Pose) -> bool {
+    /// The Mahalanobis distance of `pose` from where the prior believes it.
+    fn off(&self, pose: &Pose) -> f64 {
         let off = log(&(self.prior.pose.inverse() * pose));
-        off.dot(&(self.prior.information * off)).sqrt() < chi(self.params.max_correction)
+        off.dot(&(self.prior.information * off)).sqrt()
     }
 
     fn starts(&self) -> Vec<Pose> {
