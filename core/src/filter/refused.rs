@@ -13,7 +13,7 @@ const REACH_OF_ORIENTED: f64 = 4.5;
 /// The least of the others.
 const LEAST_REACH: f64 = 2.0;
 /// Good ones among those refused if they were normal to the ends; their tails are some times heavier.
-const FALSE: f64 = 0.004;
+const FALSE: f64 = 0.005;
 /// Standard deviations beyond which there are outliers only.
 const SURELY_OUT: f64 = 6.0;
 

@@ -16,6 +16,12 @@ const BEHIND: f64 = 0.1;
 const FACING: f64 = 0.4;
 /// Cosine between the normals of one side of a surface at least.
 pub(super) const ONE_SIDE: f64 = 0.8;
+/// A measurement that is fewer standard deviations above what lies beneath it needs no other explanation.
+const CLEARLY: f64 = 1.5;
+/// Cosine from which on the place where a ray meets the surface is looked for. At a more grazing angle noise moves it too far.
+const GRAZING: f64 = 0.25;
+/// Steps of Newton's method to where a ray meets the surface.
+const MEETING: usize = 2;
 /// Sides of the surface that a measurement is held against, the nearest first: a corner has three.
 const SIDES: usize = 3;
 
@@ -101,33 +107,71 @@ impl<'a> Explainer<'a> {
         Explainer { cells, cloud, beside, search, spacing, sensor: merged.sensor, noise }
     }
 
-    /// `None` if no point of the cloud is beside the measurement.
+    /// Of the places beneath the measurement and along its ray, where the noise is, the one that explains it better; `None` if
+    /// there is no cloud at either.
     pub(super) fn standing(&self, m: &Measurement) -> Option<Standing> {
-        let mut near: Vec<(f64, usize)> = Vec::new();
-        self.cells.for_each_within(&self.cloud.points, &m.point, self.search, |j, _| {
-            near.extend(self.aside(m, j).map(|square| (square, j)));
+        let beneath = self.nearest_side(m, &m.point).map(|side| {
+            let foot = m.point - side.normal * side.height;
+            self.held_against(m, side.height, foot, &side)
         });
-        let mut best: Option<Standing> = None;
+        let off = |s: &Standing| s.off(&self.noise.components);
+        if beneath.as_ref().is_some_and(|s| off(s) <= CLEARLY) {
+            return beneath;
+        }
+        let both = beneath.into_iter().chain(self.along_ray(m));
+        both.min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
+
+    /// Where the measurement's ray meets the surface next to it, in front or behind.
+    fn along_ray(&self, m: &Measurement) -> Option<Standing> {
+        let steps = ((self.search - self.beside) / (GRAZING * self.beside)).ceil() as i32;
+        let places = (0..=steps).flat_map(|k| [k, -k]).map(|k| f64::from(k) * self.beside);
+        let meets = |start: f64| -> Option<Standing> {
+            let mut at = start;
+            for _ in 0..MEETING {
+                let side = self.nearest_side(m, &(m.point + m.ray * at))?;
+                let cosine = m.ray.dot(&side.normal);
+                let step = -side.height / cosine;
+                if cosine > -GRAZING || (at + step - start).abs() > self.beside {
+                    return None;
+                }
+                at += step;
+            }
+            let foot = m.point + m.ray * at;
+            let side = self.nearest_side(m, &foot)?;
+            let height = side.height - at * m.ray.dot(&side.normal);
+            Some(self.held_against(m, height, foot, &side))
+        };
+        places.into_iter().find_map(meets)
+    }
+
+    /// The side of the cloud that is nearest to the place `at` of the measurement; `None` if no point of the cloud is beside it.
+    fn nearest_side(&self, m: &Measurement, at: &Vec3) -> Option<Side> {
+        let mut near: Vec<(f64, usize)> = Vec::new();
+        self.cells.for_each_within(&self.cloud.points, at, self.search, |j, _| {
+            near.extend(self.aside(m, at, j).map(|square| (square, j)));
+        });
+        let mut best: Option<Side> = None;
         for _ in 0..SIDES {
             let nearest = near.iter().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             let Some(&(_, first)) = nearest else { break };
             let axis = self.cloud.normals[first];
             let alike = |j: usize| self.cloud.normals[j].dot(&axis) >= ONE_SIDE;
-            let standing = self.above(m, near.iter().filter(|(_, j)| alike(*j)));
+            let side = self.side(at, near.iter().filter(|(_, j)| alike(*j)));
             near.retain(|(_, j)| !alike(*j));
-            let better = best.as_ref().is_none_or(|b| standing.height.abs() < b.height.abs());
+            let better = best.as_ref().is_none_or(|b| side.height.abs() < b.height.abs());
             if better {
-                best = Some(standing);
+                best = Some(side);
             }
         }
         best
     }
 
-    /// Square of the distance along the surface from the point `j` of the cloud, if that may be what was measured: the
-    /// measurement is moved to the tangent plane along its normal or along the ray, on which the noise is.
-    fn aside(&self, m: &Measurement, j: usize) -> Option<f64> {
+    /// Square of the distance along the surface from the point `j` of the cloud, if that may be what was measured at `at`: the
+    /// place is moved to the tangent plane along its normal or along the ray, on which the noise is.
+    fn aside(&self, m: &Measurement, at: &Vec3, j: usize) -> Option<f64> {
         let normal = &self.cloud.normals[j];
-        let offset = m.point - self.cloud.points[j];
+        let offset = at - self.cloud.points[j];
         let (height, cosine) = (offset.dot(normal), m.ray.dot(normal));
         if cosine > BEHIND {
             return None;
@@ -141,26 +185,77 @@ impl<'a> Explainer<'a> {
         (square <= self.beside * self.beside).then_some(square)
     }
 
-    /// Above one side, blended from the tangent planes of its points: the near ones count.
-    fn above<'s>(&self, m: &Measurement, side: impl Iterator<Item = &'s (f64, usize)>) -> Standing {
+    /// One side beneath `at`, blended from the tangent planes of its points: the near ones count.
+    fn side<'s>(&self, at: &Vec3, points: impl Iterator<Item = &'s (f64, usize)>) -> Side {
         let cloud = self.cloud;
         let (mut weights, mut height, mut normal, mut variance) = (0.0, 0.0, Vec3::zeros(), 0.0);
-        for &(square, j) in side {
+        for &(square, j) in points {
             let weight = (-2.0 * square / (self.spacing * self.spacing)).exp().max(1e-12);
             weights += weight;
-            height += weight * (m.point - cloud.points[j]).dot(&cloud.normals[j]);
+            height += weight * (at - cloud.points[j]).dot(&cloud.normals[j]);
             normal += cloud.normals[j] * weight;
             variance += weight * cloud.sigma[j] * cloud.sigma[j];
         }
-        let normal = normal / weights;
-        let (height, cosine) = (height / weights, m.ray.dot(&normal));
+        Side { height: height / weights, normal: normal / weights, variance: variance / weights }
+    }
+
+    /// The measurement `height` (metres) above the side at `foot`, in its standard deviations there.
+    fn held_against(&self, m: &Measurement, height: f64, foot: Vec3, side: &Side) -> Standing {
+        let cosine = m.ray.dot(&side.normal);
         let stated = self.sensor.at(m.range, cosine).max(f64::from(LEAST_SIGMA));
         let sigma = stated * self.noise.correction.at(m.range, cosine);
         Standing {
-            foot: m.point - normal * height,
-            normal,
+            foot,
+            normal: side.normal,
             height: height / sigma,
-            surface: variance / weights / (sigma * sigma),
+            surface: side.variance / (sigma * sigma),
         }
+    }
+}
+
+/// One side of the surface near a place.
+struct Side {
+    /// Of the place above it, metres.
+    height: f64,
+    normal: Vec3,
+    /// Of the surface, square metres.
+    variance: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Scan;
+
+    #[test]
+    fn a_measurement_is_held_against_the_place_where_its_ray_meets_the_surface() {
+        let sigma = 8e-4;
+        // A cylinder of radius 20 mm about the y axis, seen along z.
+        let (radius, mut cloud) = (0.02, Cloud::default());
+        let normal = |a: f64| Vec3::new(a.sin(), 0.0, -a.cos());
+        for i in -80..=80 {
+            for j in -20..=20 {
+                let n = normal(f64::from(i) * 0.02);
+                cloud.push(n * radius + Vec3::y() * (f64::from(j) * 4e-4), n, 1e-5, 9);
+            }
+        }
+        let points = (0..400).map(|i| [(i % 20) as f32 * 1e-3, (i / 20) as f32 * 1e-3, 0.3]);
+        let scan = Scan { points: points.collect(), width: 20, origins: Vec::new() };
+        let scan = PreparedScan::new(&scan).unwrap();
+        let mut merged = Merged::new(&[(&scan, Pose::identity())], 4e-3);
+        merged.sensor = NoiseModel::constant(sigma);
+        merged.sigma.fill(sigma as f32);
+        let noise = Learnt { correction: NoiseModel::constant(1.0), components: Components::WHITE };
+        let explainer = Explainer::new(&cloud, &merged, 4e-3, 4e-4, &noise);
+        let off = |cosine: f64, deviations: f64| {
+            let hit = normal(-cosine.acos()) * radius;
+            let point = hit - Vec3::z() * (deviations * sigma / cosine);
+            let m = Measurement { point, ray: Vec3::z(), range: 0.3, source: 0, oriented: true };
+            explainer.standing(&m).unwrap().off(&noise.components)
+        };
+        // The nearest point of the cylinder is 4.1 standard deviations away.
+        assert!((off(0.35, 3.0) - 3.0).abs() < 0.05, "{}", off(0.35, 3.0));
+        assert!((off(0.9, 3.0) - 3.0).abs() < 0.05, "{}", off(0.9, 3.0));
+        assert!(off(0.35, 8.0) > 6.0, "{}", off(0.35, 8.0));
     }
 }
