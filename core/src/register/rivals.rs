@@ -52,7 +52,7 @@ impl Rivals<'_> {
         let thin = sample.every(STRIDE);
         let moving = thin.moving(noise);
         let near = 3.0 * noise;
-        let likelihood = |pose: &Pose| {
+        let log_posterior = |pose: &Pose| {
             let matched = correspondences(&moving, self.map, pose, self.radius.end, self.params);
             let fit = matched.iter().filter(|c| c.distance.abs() < near).count() as f64;
             INDEPENDENT * fit.ln() - 0.5 * self.off(pose).powi(2)
@@ -63,11 +63,11 @@ impl Rivals<'_> {
             let other = apart.dot(&(certain * apart)).sqrt() > SAME
                 && sample.displacement(found, &pose) > 2.0 * self.radius.end;
             let allowed = self.off(&pose) < chi(self.params.max_correction);
-            (allowed && other).then(|| (pose, likelihood(&pose)))
+            (allowed && other).then(|| (pose, log_posterior(&pose)))
         };
         let tried: Vec<Option<(Pose, f64)>> = self.starts().par_iter().map(at_rest).collect();
         let best = tried.into_iter().flatten().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let odds = (best.1 - likelihood(found)).exp();
+        let odds = (best.1 - log_posterior(found)).exp();
         (odds >= ODDS).then_some(Rival { pose: best.0, better: odds > 1.0 / ODDS })
     }
 
