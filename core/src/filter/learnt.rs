@@ -4,7 +4,7 @@ use super::FilterParams;
 use super::fitter::Fitter;
 use super::merged::{LEAST_SIGMA, Merged};
 use super::quadric::Fit;
-use super::weighted::seeds;
+use super::seeds::seeds;
 use crate::geometry::{Components, Moments, NoiseModel, Residual};
 use rayon::prelude::*;
 use std::f64::consts::SQRT_2;

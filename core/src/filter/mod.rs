@@ -12,6 +12,7 @@ mod mixed;
 mod neighbours;
 mod quadric;
 mod refused;
+mod seeds;
 mod standing;
 mod thesis;
 mod weighted;

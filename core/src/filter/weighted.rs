@@ -6,8 +6,9 @@ use super::fitter::Fitter;
 use super::learnt::Learnt;
 use super::merged::Merged;
 use super::quadric::Fit;
+use super::seeds::seeds;
 use crate::geometry::{Cloud, Components, Vec3};
-use crate::voxel::{CellIndex, keep_apart, most_central, sides};
+use crate::voxel::{CellIndex, keep_apart};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
@@ -37,18 +38,6 @@ pub(super) fn filter(
         fits.extend(fitted.into_iter().flatten());
     }
     Ok(thin(fits, reduction_radius, &noise.components))
-}
-
-/// In each cell of the reduction radius, the most central measurement of each side of the surface.
-pub(super) fn seeds(merged: &Merged, reduction_radius: f64, params: &FilterParams) -> Vec<usize> {
-    let cells = CellIndex::new(&merged.points, reduction_radius);
-    let cosine = params.max_normal_angle.cos();
-    let in_cell = |cell| {
-        let found = sides(cells.points_in(cell), &merged.normals, cosine);
-        found.iter().filter_map(|side| most_central(&merged.points, side)).collect()
-    };
-    let chosen: Vec<Vec<usize>> = cells.cells().par_iter().map(|&cell| in_cell(cell)).collect();
-    chosen.into_iter().flatten().collect()
 }
 
 /// Keeps the best supported points, about a reduction radius from each other on each side.
