@@ -125,7 +125,8 @@ impl<'a> Explainer<'a> {
     /// Where the measurement's ray meets the surface next to it, in front or behind.
     fn along_ray(&self, m: &Measurement) -> Option<Standing> {
         let steps = ((self.search - self.beside) / (GRAZING * self.beside)).ceil() as i32;
-        let places = (0..=steps).flat_map(|k| [k, -k]).map(|k| f64::from(k) * self.beside);
+        let around = (1..=steps).flat_map(|k| [k, -k]);
+        let places = std::iter::once(0).chain(around).map(|k| f64::from(k) * self.beside);
         let meets = |start: f64| -> Option<Standing> {
             let mut at = start;
             for _ in 0..MEETING {

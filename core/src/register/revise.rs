@@ -17,7 +17,7 @@ use super::factors::tukey_loss;
 use super::sample::Sample;
 use super::verdict::Status;
 use super::{RegisterParams, Registration};
-use crate::geometry::{Mat6, Pose, Twist, exp, log};
+use crate::geometry::{Mat6, Pose, Twist, exp};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -115,9 +115,7 @@ impl Look<'_> {
         let near: f64 = found.iter().map(|c| tukey_loss(c.distance / self.noise())).sum();
         let missed = (moving.points.len() - found.len()) as f64 * tukey_loss(f64::INFINITY);
         let each = self.sample.points.len() as f64 / moving.points.len().max(1) as f64;
-        let off = log(&(self.prior.pose.inverse() * pose));
-        self.params.information_share * each * (near + missed)
-            + off.dot(&(self.prior.information * off)) / 2.0
+        self.params.information_share * each * (near + missed) + self.prior.off_squared(pose) / 2.0
     }
 
     /// The scan's noise and the map's, metres.

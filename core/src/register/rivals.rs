@@ -55,14 +55,14 @@ impl Rivals<'_> {
         let log_posterior = |pose: &Pose| {
             let matched = correspondences(&moving, self.map, pose, self.radius.end, self.params);
             let fit = matched.iter().filter(|c| c.distance.abs() < near).count() as f64;
-            INDEPENDENT * fit.ln() - 0.5 * self.off(pose).powi(2)
+            INDEPENDENT * fit.ln() - 0.5 * self.prior.off_squared(pose)
         };
         let at_rest = |start: &Pose| {
             let pose = self.released(&moving, start);
             let apart = log(&(found.inverse() * pose));
             let other = apart.dot(&(certain * apart)).sqrt() > SAME
                 && sample.displacement(found, &pose) > 2.0 * self.radius.end;
-            let allowed = self.off(&pose) < chi(self.params.max_correction);
+            let allowed = self.prior.off_squared(&pose).sqrt() < chi(self.params.max_correction);
             (allowed && other).then(|| (pose, log_posterior(&pose)))
         };
         let tried: Vec<Option<(Pose, f64)>> = self.starts().par_iter().map(at_rest).collect();
@@ -75,12 +75,6 @@ impl Rivals<'_> {
     fn released(&self, moving: &Moving, start: &Pose) -> Pose {
         let loose = Prior { pose: *start, information: self.prior.information / 4.0 };
         align(moving, self.map, &loose, self.radius, self.params).pose
-    }
-
-    /// The Mahalanobis distance of `pose` from where the prior believes it.
-    fn off(&self, pose: &Pose) -> f64 {
-        let off = log(&(self.prior.pose.inverse() * pose));
-        off.dot(&(self.prior.information * off)).sqrt()
     }
 
     fn starts(&self) -> Vec<Pose> {

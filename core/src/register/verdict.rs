@@ -2,7 +2,7 @@
 
 use super::align::{Alignment, Prior};
 use super::{Method, RegisterParams};
-use crate::geometry::{Mat6, Pose, Twist, log};
+use crate::geometry::{Mat6, Pose, Twist};
 use nalgebra::SymmetricEigen;
 
 /// Whether a scan joins the model.
@@ -146,9 +146,8 @@ fn problem(
 
 /// What is wrong with a pose that lies too far from where the prior believes it.
 fn correction(pose: &Pose, prior: &Prior, params: &RegisterParams) -> Option<String> {
-    let xi = log(&(prior.pose.inverse() * pose));
-    let mahalanobis = xi.dot(&(prior.information * xi)).sqrt();
-    (mahalanobis > chi(params.max_correction)).then(|| {
+    (prior.off_squared(pose).sqrt() > chi(params.max_correction)).then(|| {
+        let xi = prior.off(pose);
         format!(
             "correction of {:.1} mm and {:.2} degrees is beyond {} standard deviations of the robot's pose",
             xi.fixed_rows::<3>(0).norm() * 1e3,

@@ -113,6 +113,19 @@ pub(crate) struct Prior {
     pub information: Mat6,
 }
 
+impl Prior {
+    /// How far `pose` is from where it is believed to be.
+    pub(crate) fn off(&self, pose: &Pose) -> Twist {
+        log(&(self.pose.inverse() * pose))
+    }
+
+    /// The square of that in standard deviations (Mahalanobis).
+    pub(crate) fn off_squared(&self, pose: &Pose) -> f64 {
+        let off = self.off(pose);
+        off.dot(&(self.information * off))
+    }
+}
+
 /// The schedule of the search radius, metres.
 #[derive(Clone, Copy)]
 pub(crate) struct Radius {
@@ -177,7 +190,7 @@ fn descend(
         if !thesis {
             // The derivative of log(T0^-1 T exp(xi)) by xi is the identity to first order in the correction.
             hessian += prior.information;
-            gradient += prior.information * log(&(prior.pose.inverse() * pose));
+            gradient += prior.information * prior.off(&pose);
         }
         let Some(step) = solve(&hessian, &gradient) else { break };
         pose *= exp(&step);
