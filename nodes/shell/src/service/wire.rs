@@ -18,13 +18,22 @@ pub(crate) struct CallId {
 /// sequence number.
 const CYCLONE_HEADER: usize = 16;
 
-/// Enhanced: payloads beyond this many bytes leave in fragments, and rustdds 0.15.1 writes a fragment's inline QoS so that
-/// nobody can read it. Their identity stands behind the payload, where a reader of CDR does not look.
+/// Enhanced: longer payloads, in bytes, may leave in fragments, and rustdds 0.15.1 writes a
+/// fragment's inline QoS so that nobody can read it. Their identity stands behind the payload,
+/// where a reader of CDR does not look. Through an interface with an MTU of at least 1,156 bytes
+/// this length leaves whole.
 const LARGEST_WHOLE: usize = 1024;
 /// In front of an identity that stands behind the payload.
 const TRAILER_MARK: [u8; 8] = *b"\0related";
 /// Mark, GUID, sequence number.
 const TRAILER: usize = 8 + 16 + 8;
+/// An identity behind a payload starts, and so ends, at a multiple of this many bytes, as RTPS
+/// aligns submessages. The receiver's interface decides whether a sample leaves in fragments, which
+/// keep its length, or whole and padded to this; the identity must be the last either way.
+const TRAILER_ALIGNMENT: usize = 4;
+
+/// First bytes of the GUIDs that Cyclone DDS gives out: its vendor number.
+const CYCLONE_VENDOR: [u8; 2] = [1, 16];
 
 /// What goes out: bytes and the related sample identity of the inline QoS.
 pub(crate) type Outgoing = (Vec<u8>, Option<SampleIdentity>);
@@ -107,10 +116,7 @@ pub(crate) fn read_reply(
     match mapping {
         ServiceMapping::Enhanced => {
             let (related, raw) = split_identity(sample);
-            let related = related.ok_or(
-                "a reply without related sample identity: does its server speak rmw_cyclonedds's \
-                 convention? Set RMW_IMPLEMENTATION alike on both sides",
-            )?;
+            let related = related.ok_or_else(|| unaddressed(sample))?;
             let mine = related.writer_guid == writer || related.writer_guid == reply_reader;
             Ok(mine.then(|| (i64::from(related.sequence_number), raw)))
         }
@@ -134,13 +140,25 @@ fn with_identity(payload: &[u8], related: SampleIdentity) -> Outgoing {
         return (payload.to_vec(), Some(related));
     }
     let mut bytes = payload.to_vec();
+    bytes.resize(payload.len().next_multiple_of(TRAILER_ALIGNMENT), 0);
     bytes.extend(TRAILER_MARK);
     bytes.extend(related.writer_guid.to_bytes());
     bytes.extend(i64::from(related.sequence_number).to_le_bytes());
     (bytes, None)
 }
 
-/// The identity of a sample, wherever it stands, and its payload alone.
+/// What is wrong with a reply that does not say whom it is for.
+fn unaddressed(sample: &Sample) -> String {
+    let cause = if sample.writer().to_bytes().starts_with(&CYCLONE_VENDOR) {
+        "its server runs on Cyclone DDS; set RMW_IMPLEMENTATION=rmw_cyclonedds_cpp here, too"
+    } else {
+        "either its server runs with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, which this node must \
+         then have, too, or it answers by no convention of ROS 2"
+    };
+    format!("a reply of {} bytes without related sample identity: {cause}", sample.raw.body.len())
+}
+
+/// The identity of a sample, wherever it stands, and its payload, which zeros may follow.
 fn split_identity(sample: &Sample) -> (Option<SampleIdentity>, Raw) {
     let body = &sample.raw.body;
     let found = body
@@ -216,23 +234,35 @@ mod tests {
         assert_eq!(&payload.body[..], b"abcd");
     }
 
+    /// As rustdds hands over a sample that was sent whole: padded to a multiple of four bytes.
+    fn padded((mut bytes, related): Outgoing) -> Outgoing {
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        (bytes, related)
+    }
+
+    /// Whether `raw` is the payload and up to three zeros.
+    fn is_padded(raw: &Raw, payload: &[u8]) -> bool {
+        let rest = raw.body.strip_prefix(payload);
+        rest.is_some_and(|rest| rest.len() < 4 && rest.iter().all(|byte| *byte == 0))
+    }
+
     #[test]
-    fn what_leaves_in_fragments_has_its_identity_behind_it() {
-        let long = vec![7; LARGEST_WHOLE + 1];
-        for first in [None, Some(7)] {
-            let sent = request(ServiceMapping::Enhanced, &long, guid(WRITER), guid(READER), first);
-            assert!(sent.1.is_none());
-            assert_eq!(sent.0[..long.len()], long);
-            let sample = sample(sent, WRITER, 7);
-            let (id, payload) = read_request(ServiceMapping::Enhanced, &sample).unwrap();
-            assert_eq!(id, CallId { client: READER, sequence: 7 });
-            assert_eq!(payload.body, long);
-            let sent = reply(ServiceMapping::Enhanced, &long, id);
-            let (mapping, writer) = (ServiceMapping::Enhanced, guid(WRITER));
-            let sample = self::sample(sent, OTHER, 1);
-            let got = read_reply(mapping, &sample, writer, guid(READER)).unwrap();
-            let (sequence, payload) = got.unwrap();
-            assert_eq!((sequence, payload.body), (7, Bytes::from(long.clone())));
+    fn what_may_leave_in_fragments_has_its_identity_behind_it() {
+        let mapping = ServiceMapping::Enhanced;
+        for (beyond, first) in (1..=8).flat_map(|beyond| [(beyond, None), (beyond, Some(7))]) {
+            let long = vec![7; LARGEST_WHOLE + beyond];
+            for arrived in [|sent| sent, padded] {
+                let sent = request(mapping, &long, guid(WRITER), guid(READER), first);
+                assert!(sent.1.is_none());
+                let (id, payload) =
+                    read_request(mapping, &sample(arrived(sent), WRITER, 7)).unwrap();
+                assert_eq!(id, CallId { client: READER, sequence: 7 }, "{beyond}");
+                assert!(is_padded(&payload, &long), "{beyond}");
+                let back = sample(arrived(reply(mapping, &long, id)), OTHER, 1);
+                let got = read_reply(mapping, &back, guid(WRITER), guid(READER)).unwrap();
+                let (sequence, payload) = got.unwrap();
+                assert!(sequence == 7 && is_padded(&payload, &long), "{beyond}");
+            }
         }
     }
 
@@ -260,9 +290,13 @@ mod tests {
             .unwrap();
             assert_eq!(got.map(|(sequence, _)| sequence), (client != OTHER).then_some(7));
         }
-        let bare = sample((Vec::new(), None), OTHER, 1);
-        let error = read_reply(ServiceMapping::Enhanced, &bare, guid(WRITER), guid(READER));
-        assert!(error.unwrap_err().contains("RMW_IMPLEMENTATION"));
+        let cyclone = [[1, 16].as_slice(), &OTHER[2..]].concat().try_into().unwrap();
+        for (writer, says) in [(cyclone, "its server runs on Cyclone DDS"), (OTHER, "either")] {
+            let bare = sample((vec![0; 9], None), writer, 1);
+            let error = read_reply(ServiceMapping::Enhanced, &bare, guid(WRITER), guid(READER));
+            let error = error.unwrap_err();
+            assert!(error.contains("9 bytes") && error.contains(says), "{error}");
+        }
     }
 
     #[test]
