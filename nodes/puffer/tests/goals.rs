@@ -7,7 +7,7 @@ mod common;
 
 use common::processes::{Running, free_domain};
 use puffer_core::mesh::io::read_mesh;
-use puffer_msgs::action::{ModelObject, ModelObjectGoal};
+use puffer_msgs::action::{ModelObject, ModelObjectFeedback, ModelObjectGoal};
 use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_shell::{NoParams, Node, Outcome, RosArgs, Stop};
 use std::path::Path;
@@ -16,15 +16,47 @@ use std::time::Duration;
 /// Long enough for a loaded machine.
 const LONG: Duration = Duration::from_secs(300);
 
+/// Launched nodes that are ready for a goal, and a node that sends it.
+async fn launched(folder: &Path, object: &str) -> (Running, Node<NoParams>) {
+    let domain = free_domain();
+    let call = ["launch", "--setup", "kr16_laser", "--object", object, "--out", "out"];
+    let launch = Running::start(folder, domain, &call);
+    launch.wait_for("[modeller]: ready");
+    let args = RosArgs::default().with_domain(domain);
+    (launch, Node::start("operator", args, Stop::new()).await.unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn goals_follow_each_other_on_the_same_nodes_and_every_second_is_cancelled() {
+    let folder = tempfile::tempdir().unwrap();
+    let (launch, node) = launched(folder.path(), "mug").await;
+    let client = node.action_client::<ModelObject>("model_object").unwrap();
+    let goal = ModelObjectGoal { max_scans: 2, ..ModelObjectGoal::default() };
+    for number in 1..=5 {
+        let mut handle = client.send(&goal, LONG).await.unwrap().unwrap();
+        if number % 2 == 0 {
+            // The second goal is given up as soon as it plans, the fourth after its first scan.
+            let until = |told: &ModelObjectFeedback| match number {
+                2 => told.phase == ModelObjectFeedback::PLANNING,
+                _ => told.scans > 0,
+            };
+            while handle.feedback().await.is_some_and(|told| !until(&told)) {}
+            let given_up = handle.cancel(LONG).await.unwrap();
+            assert!(given_up, "goal {number} had ended: {}", launch.said());
+        }
+        let outcome = handle.result(LONG).await.unwrap();
+        match (number % 2, &outcome) {
+            (0, Outcome::Canceled(_)) => {}
+            (1, Outcome::Succeeded(result)) if result.scans == 2 => {}
+            _ => panic!("goal {number}: {outcome:?}: {}", launch.said()),
+        }
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_region_bounds_the_mesh_and_a_sigma_out_of_reach_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let domain = free_domain();
-    let call = ["launch", "--setup", "kr16_laser", "--object", "coffee", "--out", "out"];
-    let launch = Running::start(folder.path(), domain, &call);
-    launch.wait_for("[modeller]: ready");
-    let args = RosArgs::default().with_domain(domain);
-    let node = Node::<NoParams>::start("operator", args, Stop::new()).await.unwrap();
+    let (launch, node) = launched(folder.path(), "coffee").await;
     let client = node.action_client::<ModelObject>("model_object").unwrap();
     let goal = |z: f64, sigma: f32| ModelObjectGoal {
         max_scans: 3,
