@@ -79,6 +79,26 @@ impl HalfEdgeMesh {
         Mesh::new(vertices, triangles)
     }
 
+    /// The mesh without the gaps that edits left; vertices and triangles keep their order.
+    pub fn compacted(self) -> HalfEdgeMesh {
+        let vertex_of = numbered(self.outgoing.iter().map(|half| *half != NONE));
+        let triangle_of = numbered(self.triangles.iter().map(|t| t[0] != NONE));
+        let half_of = |h: u32| 3 * triangle_of[h as usize / 3] + h % 3;
+        let kept = |t: usize| triangle_of[t] != NONE;
+        let vertices = (0..self.positions.len()).filter(|&v| vertex_of[v] != NONE);
+        let (positions, outgoing) =
+            vertices.map(|v| (self.positions[v], half_of(self.outgoing[v]))).unzip();
+        let triangles = (0..self.triangles.len()).filter(|&t| kept(t));
+        let triangles = triangles.map(|t| self.triangles[t].map(|v| vertex_of[v as usize]));
+        let halves = (0..self.twins.len()).filter(|&h| kept(h / 3));
+        HalfEdgeMesh {
+            positions,
+            outgoing,
+            triangles: triangles.collect(),
+            twins: halves.map(|h| half_of(self.twins[h])).collect(),
+        }
+    }
+
     /// The triangles as they stand, with all positions, so that vertex indices agree with those here.
     pub fn snapshot(&self) -> Mesh {
         let alive = self.triangles.iter().filter(|t| t[0] != NONE);
@@ -257,6 +277,17 @@ impl HalfEdgeMesh {
     }
 }
 
+/// Consecutive numbers for what is kept, [`NONE`] for the rest.
+fn numbered(kept: impl Iterator<Item = bool>) -> Vec<u32> {
+    let mut next = 0;
+    kept.map(|kept| {
+        let number = if kept { next } else { NONE };
+        next += u32::from(kept);
+        number
+    })
+    .collect()
+}
+
 fn next(h: u32) -> u32 {
     if h % 3 == 2 { h - 2 } else { h + 1 }
 }
@@ -318,6 +349,21 @@ mod tests {
             assert!(collapsed > 20);
             assert_sound(&mesh, expected_genus);
         }
+    }
+
+    #[test]
+    fn closing_the_gaps_changes_nothing_but_numbers() {
+        let mut mesh = HalfEdgeMesh::new(&test_shapes::torus(1.0, 0.4, 20, 10)).unwrap();
+        for h in (0..mesh.half_edges()).step_by(7) {
+            if mesh.is_alive(h) && mesh.can_collapse(h) {
+                mesh.collapse(h, mesh.positions[mesh.from(h) as usize]);
+            }
+        }
+        let compacted = mesh.clone().compacted();
+        assert!(compacted.positions.len() < mesh.positions.len());
+        assert!(compacted.half_edges() < mesh.half_edges());
+        assert_sound(&compacted, 1);
+        assert_eq!(compacted.into_mesh(), mesh.into_mesh());
     }
 
     #[test]

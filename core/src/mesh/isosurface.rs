@@ -47,6 +47,11 @@ impl Lattice {
         self.origin + Vec3::new(x as f64, y as f64, z as f64) * self.spacing
     }
 
+    /// The same lattice without values.
+    pub(crate) fn without_values(&self) -> Lattice {
+        Lattice { origin: self.origin, spacing: self.spacing, size: self.size, values: Vec::new() }
+    }
+
     /// Samples `field` at `spacing` (metres, positive) over all of `aabb`, in parallel.
     pub fn sample(aabb: &Aabb, spacing: f64, field: impl Fn(&Vec3) -> f64 + Sync) -> Lattice {
         let extent = aabb.extent();

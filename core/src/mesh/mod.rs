@@ -7,6 +7,7 @@ pub mod intersect;
 pub mod invariants;
 pub mod io;
 pub mod isosurface;
+pub mod neighbours;
 pub mod remesh;
 pub mod render;
 #[cfg(test)]

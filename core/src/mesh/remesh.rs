@@ -8,6 +8,9 @@ use crate::geometry::Vec3;
 /// neither edit undoes the other (Botsch & Kobbelt 2004, §4).
 const LONG: f64 = 4.0 / 3.0;
 const SHORT: f64 = 4.0 / 5.0;
+/// Growth of the edge length in one pass of coarsening: a vertex takes in few others at once, so that none gets so many
+/// neighbours that asking them takes long.
+const COARSENING_STEP: f64 = 1.4;
 /// A collapse or flip may turn no triangle farther (30 degrees).
 const LARGEST_TURN: f64 = 0.866;
 /// Edges with a sharper dihedral than this are ridges (40 degrees).
@@ -19,6 +22,23 @@ pub fn remesh(mesh: &mut HalfEdgeMesh, target: f64, frozen: impl Fn(u32) -> bool
     split_long(mesh, LONG * target);
     collapse_short(mesh, SHORT * target, LONG * target, &frozen);
     flip_obtuse(mesh, &frozen);
+}
+
+/// Collapses edges that are too short for the edge length `target` (metres), in passes that ask for ever longer edges. Vertices
+/// for which `frozen` holds are not removed.
+pub fn coarsen(mesh: &mut HalfEdgeMesh, target: f64, frozen: impl Fn(u32) -> bool) {
+    let mut length = mean_length(mesh);
+    while length < target {
+        length = (COARSENING_STEP * length).min(target);
+        collapse_short(mesh, SHORT * length, LONG * length, &frozen);
+    }
+}
+
+/// Mean length of the edges, metres; infinite if there are none.
+fn mean_length(mesh: &HalfEdgeMesh) -> f64 {
+    let alive = (0..mesh.half_edges()).filter(|&h| mesh.is_alive(h));
+    let (sum, count) = alive.fold((0.0, 0.0), |(sum, n), h| (sum + mesh.length(h), n + 1.0));
+    if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
 /// Splits every edge longer than `longest` (metres) in its middle until there is none.
@@ -144,7 +164,7 @@ pub fn vertex_normals(mesh: &HalfEdgeMesh) -> Vec<Vec3> {
 mod tests {
     use super::*;
     use crate::mesh::{
-        genus, is_closed, is_two_manifold, min_angles, self_intersections, test_shapes,
+        Mesh, genus, is_closed, is_two_manifold, min_angles, self_intersections, test_shapes,
     };
 
     #[test]
@@ -166,6 +186,21 @@ mod tests {
             angles.sort_by(f64::total_cmp);
             assert!(angles[angles.len() / 20] > 0.3, "{}", angles[angles.len() / 20]);
         }
+    }
+
+    #[test]
+    fn coarsening_keeps_the_shape_and_stops() {
+        let shape = test_shapes::torus(1.0, 0.35, 160, 64);
+        let mut mesh = HalfEdgeMesh::new(&shape).unwrap();
+        coarsen(&mut mesh, 0.15, |_| false);
+        let plain = mesh.into_mesh();
+        assert!(plain.triangles.len() < shape.triangles.len() / 5, "{}", plain.triangles.len());
+        assert!(is_closed(&plain) && is_two_manifold(&plain));
+        assert_eq!(genus(&plain), Some(1));
+        assert!((plain.volume() / shape.volume() - 1.0).abs() < 0.05);
+        let mut frozen = HalfEdgeMesh::new(&shape).unwrap();
+        coarsen(&mut frozen, 0.15, |_| true);
+        assert_eq!(frozen.into_mesh(), Mesh::new(shape.vertices, shape.triangles));
     }
 
     #[test]

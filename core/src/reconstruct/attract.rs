@@ -5,8 +5,9 @@ use crate::geometry::{Cloud, Vec3};
 use crate::voxel::CellIndex;
 
 /// The filtered points, sorted for searches round vertices.
-pub(super) struct Measurements<'a> {
-    pub cloud: &'a Cloud,
+pub(super) struct Measurements {
+    /// In the order of the cells, so that neighbours in space are neighbours in memory.
+    cloud: Cloud,
     cells: CellIndex,
 }
 
@@ -27,10 +28,14 @@ const LEAST: usize = 3;
 /// Standard deviation believed where the cloud gives none, as a share of the search width.
 const UNKNOWN_SIGMA: f64 = 0.25;
 
-impl<'a> Measurements<'a> {
+impl Measurements {
     /// `reach` is the usual search radius, metres.
-    pub(super) fn new(cloud: &'a Cloud, reach: f64) -> Self {
-        Measurements { cloud, cells: CellIndex::new(&cloud.points, reach) }
+    pub(super) fn new(cloud: &Cloud, reach: f64) -> Measurements {
+        let cells = CellIndex::new(&cloud.points, reach);
+        let by_cell = cells.cells().iter().flat_map(|cell| cells.points_in(*cell));
+        let order: Vec<usize> = by_cell.map(|&i| i as usize).collect();
+        let cloud = cloud.select(&order);
+        Measurements { cells: CellIndex::new(&cloud.points, reach), cloud }
     }
 
     /// The pull on `vertex` with unit normal `normal`, by points within about `width` (metres); `None` where

@@ -6,7 +6,7 @@ use super::shape::{Smoothing, regularise, smooth, umbrella};
 use super::{DetailMethod, ReconstructParams, Scale};
 use crate::geometry::Vec3;
 use crate::mesh::HalfEdgeMesh;
-use crate::mesh::remesh::{remesh, vertex_normals};
+use crate::mesh::remesh::{coarsen, remesh, vertex_normals};
 use crate::{Progress, Result};
 use rayon::prelude::*;
 
@@ -35,6 +35,10 @@ pub(super) fn detail(
         // than the thesis's 2 l the first finding range would miss the points.
         DetailMethod::Thesis => scale.start_edge.max(THESIS_START * scale.voxel),
     };
+    if params.detail == DetailMethod::Implicit {
+        // The field's lattice is finer than the mesh needs to be.
+        edit_guarded(mesh, |mesh, frozen| coarsen(mesh, start_edge, frozen));
+    }
     for i in 0..=last {
         progress.report("detail", i as f64 / (last + 1) as f64)?;
         let share = if last == 0 { 0.0 } else { (last - i) as f64 / last as f64 };

@@ -1,25 +1,28 @@
-//! The default inflation: the inside space is where the winding number of the points exceeds one half, as far as
-//! it can be filled from its deepest voxel; the mesh is that space's border.
+//! The default inflation: the inside space is where the winding number of the points and the votes of single points
+//! say inside, with the loops that they support; the mesh is that space's border.
 //!
 //! It answers the thesis's two questions for all voxels at once. A beam that would escape through a hole or
 //! meet the mesh's own back is a winding number below one half; fronts that meet are one space, so handles and
 //! through-holes come out with their true genus.
 
-use super::winding::Winding;
-use crate::geometry::{Aabb, Cloud};
+use super::topology::filter_topology;
+use super::votes::add_votes;
+use super::winding::{Winding, areas};
+use crate::geometry::{Aabb, Cloud, Vec3};
 use crate::mesh::{Mesh, isosurface::Lattice};
 use crate::{Error, Progress, Result};
 use rayon::prelude::*;
 
-/// Cells of the coarse lattice along each edge of a coarse cell.
-const COARSE: usize = 4;
-/// Lattice corners at most: 100 million take 0.4 GB.
-const MOST_CORNERS: f64 = 1e8;
-/// A coarse cell far from all points is filled from its corners if their winding numbers all keep this distance
-/// from one half.
-const CLEAR: f32 = 0.25;
+/// Times that the lattice is refined by two near the points.
+const REFINEMENTS: usize = 2;
+/// Lattice corners at most: 100 million take 1 GB.
+const MAX_CORNERS: f64 = 1e8;
+/// How far on both sides of zero a loop must be supported, in votes of a whole sheet: a quarter is what single stray
+/// points make of the winding number.
+const LOOP_MARGIN: f32 = 0.25;
 
-/// The surface of the inside space at lattice spacing `spacing` (metres); the points lie `point_spacing` apart.
+/// The surface of the inside space at lattice spacing `spacing` (metres), of the `components` largest bodies at most; the
+/// points lie `point_spacing` apart.
 ///
 /// # Errors
 /// [`Error::Input`] if the points enclose nothing, or the lattice would be too large; [`Error::Cancelled`].
@@ -30,10 +33,12 @@ pub(super) fn inflate(
     components: usize,
     progress: &Progress,
 ) -> Result<Mesh> {
-    let winding = Winding::new(cloud, point_spacing);
+    let areas = areas(cloud, point_spacing);
+    let winding = Winding::new(cloud, &areas, point_spacing);
     let mut lattice = sample(cloud, &winding, spacing, progress)?;
-    keep_largest(&mut lattice, components);
-    fill_cavities(&mut lattice);
+    add_votes(&mut lattice, cloud, &areas, point_spacing);
+    progress.report("inflate", 0.8)?;
+    filter_topology(&mut lattice, LOOP_MARGIN, components);
     let mesh = lattice.surface();
     if mesh.triangles.is_empty() {
         return Err(Error::input(
@@ -43,42 +48,60 @@ pub(super) fn inflate(
     Ok(mesh)
 }
 
-/// One half minus the winding number, coarse where no point is near and the answer clear.
+/// What the winding number says, scaled as [`vote`] does: exact near the points, between coarser corners elsewhere.
 fn sample(cloud: &Cloud, winding: &Winding, spacing: f64, progress: &Progress) -> Result<Lattice> {
-    let bounds = Aabb::of(&cloud.points).padded(2.0 * COARSE as f64 * spacing);
+    let coarse = spacing * f64::from(1 << REFINEMENTS);
+    let bounds = Aabb::of(&cloud.points).padded(2.0 * coarse);
     let corners = bounds.extent().iter().map(|e| e / spacing + 1.0).product::<f64>();
-    if corners > MOST_CORNERS {
+    if corners > MAX_CORNERS {
         return Err(Error::input(format!(
-            "a lattice of {:.2} mm over {:.2} m has {corners:.1e} corners, {MOST_CORNERS:.0e} are allowed: raise \
+            "a lattice of {:.2} mm over {:.2} m has {corners:.1e} corners, {MAX_CORNERS:.0e} are allowed: raise \
              reconstruct.edge_length",
             spacing * 1e3,
             bounds.extent().max()
         )));
     }
-    let coarse = Lattice::sample(&bounds, spacing * COARSE as f64, |p| 0.5 - winding.at(p));
-    progress.report("inflate", 0.3)?;
-    let near = near_points(cloud, &coarse);
-    let size = coarse.size.map(|n| (n - 1) * COARSE + 1);
-    let mut lattice = Lattice { origin: coarse.origin, spacing, size, values: Vec::new() };
-    let slices: Vec<Vec<f32>> =
-        (0..size[2])
-            .into_par_iter()
-            .map(|z| {
-                let mut slice = Vec::with_capacity(size[0] * size[1]);
-                for y in 0..size[1] {
-                    for x in 0..size[0] {
-                        let cell = [x, y, z].map(|v| v / COARSE);
-                        slice.push(clear_value(&coarse, &near, cell).unwrap_or_else(|| {
-                            (0.5 - winding.at(&lattice.position(x, y, z))) as f32
-                        }));
-                    }
-                }
-                slice
-            })
-            .collect();
-    lattice.values = slices.concat();
-    progress.report("inflate", 0.8)?;
+    let mut lattice = Lattice::sample(&bounds, coarse, |p| vote(winding, p));
+    for level in 1..=REFINEMENTS {
+        progress.report("inflate", 0.7 * level as f64 / (REFINEMENTS + 1) as f64)?;
+        lattice = refine(&lattice, cloud, winding);
+    }
     Ok(lattice)
+}
+
+/// The winding number's vote at `p`: from -1 inside to 1 outside, and no more where sheets overlap.
+fn vote(winding: &Winding, p: &Vec3) -> f64 {
+    (1.0 - 2.0 * winding.at(p)).clamp(-1.0, 1.0)
+}
+
+/// The lattice at half the spacing: new corners of cells near points are sampled, all others lie between the old ones.
+fn refine(coarse: &Lattice, cloud: &Cloud, winding: &Winding) -> Lattice {
+    let near = near_points(cloud, coarse);
+    let size = coarse.size.map(|n| 2 * (n - 1) + 1);
+    let mut lattice = Lattice { spacing: coarse.spacing / 2.0, size, ..coarse.clone() };
+    let mut values = vec![0f32; size.iter().product()];
+    values.par_chunks_mut(size[0]).enumerate().for_each(|(row, values)| {
+        for (x, value) in values.iter_mut().enumerate() {
+            let corner = [x, row % size[1], row / size[1]];
+            let cell = corner.map(|v| v / 2);
+            *value = if corner.iter().any(|v| v % 2 == 1)
+                && near[coarse.index(cell[0], cell[1], cell[2])]
+            {
+                vote(winding, &lattice.position(corner[0], corner[1], corner[2])) as f32
+            } else {
+                between(coarse, corner)
+            };
+        }
+    });
+    lattice.values = values;
+    lattice
+}
+
+/// The mean of the coarse corners that `corner` of the refined lattice lies between.
+fn between(coarse: &Lattice, corner: [usize; 3]) -> f32 {
+    let place = |bits: usize, axis: usize| (corner[axis] + (bits >> axis & 1)) / 2;
+    let value = |bits| coarse.values[coarse.index(place(bits, 0), place(bits, 1), place(bits, 2))];
+    (0..8).map(value).sum::<f32>() / 8.0
 }
 
 /// Marks the coarse cells that hold points, and their neighbours.
@@ -95,79 +118,4 @@ fn near_points(cloud: &Cloud, coarse: &Lattice) -> Vec<bool> {
         }
     }
     near
-}
-
-/// The value of all of a coarse cell, where no point is near and its corners agree.
-fn clear_value(coarse: &Lattice, near: &[bool], cell: [usize; 3]) -> Option<f32> {
-    let corner = |bits: usize| {
-        let [x, y, z] = [0, 1, 2].map(|i| (cell[i] + (bits >> i & 1)).min(coarse.size[i] - 1));
-        coarse.index(x, y, z)
-    };
-    if near[corner(0)] {
-        return None;
-    }
-    let first = coarse.values[corner(0)];
-    let agrees = |bits| {
-        let value = coarse.values[corner(bits)];
-        value.abs() > CLEAR && (value > 0.0) == (first > 0.0)
-    };
-    (0..8).all(agrees).then_some(first)
-}
-
-/// Keeps the `count` largest connected inside spaces; the rest becomes outside.
-fn keep_largest(lattice: &mut Lattice, count: usize) {
-    let mut regions = regions(lattice, |value| value < 0.0);
-    regions.sort_by_key(|region| (std::cmp::Reverse(region.len()), region.first().copied()));
-    for &corner in regions.iter().skip(count).flatten() {
-        lattice.values[corner] = 0.5;
-    }
-}
-
-/// Outside spaces that the outside does not reach cannot have been seen: they become inside.
-fn fill_cavities(lattice: &mut Lattice) {
-    let outer = lattice.index(0, 0, 0);
-    for region in regions(lattice, |value| value >= 0.0) {
-        // Regions are found in ascending order of their first corner: the outer one holds corner 0.
-        if region[0] != outer {
-            for corner in region {
-                lattice.values[corner] = -0.5;
-            }
-        }
-    }
-}
-
-/// Connected sets of corners (6 neighbours) whose value fulfils `wanted`, each starting with its lowest corner.
-fn regions(lattice: &Lattice, wanted: impl Fn(f32) -> bool) -> Vec<Vec<usize>> {
-    let [nx, ny, nz] = lattice.size;
-    let mut seen = vec![false; lattice.values.len()];
-    let mut found = Vec::new();
-    for start in 0..lattice.values.len() {
-        if seen[start] || !wanted(lattice.values[start]) {
-            continue;
-        }
-        seen[start] = true;
-        let mut region = vec![start];
-        let mut next = 0;
-        while next < region.len() {
-            let corner = region[next];
-            next += 1;
-            let (x, y, z) = (corner % nx, corner / nx % ny, corner / (nx * ny));
-            let steps = [
-                (x > 0).then(|| corner - 1),
-                (x + 1 < nx).then(|| corner + 1),
-                (y > 0).then(|| corner - nx),
-                (y + 1 < ny).then(|| corner + nx),
-                (z > 0).then(|| corner - nx * ny),
-                (z + 1 < nz).then(|| corner + nx * ny),
-            ];
-            for neighbour in steps.into_iter().flatten() {
-                if !seen[neighbour] && wanted(lattice.values[neighbour]) {
-                    seen[neighbour] = true;
-                    region.push(neighbour);
-                }
-            }
-        }
-        found.push(region);
-    }
-    found
 }

@@ -66,7 +66,8 @@ fn sorted(mut vertices: Vec<u32>) -> Vec<u32> {
 }
 
 /// Applies `edit` (splits, collapses, flips), which takes the mesh and the vertices it must leave alone. Where
-/// the outcome cuts itself it is taken back and tried again with the vertices there frozen; at last all are.
+/// the outcome cuts itself it is taken back and tried again with the vertices there frozen; at last all are. Vertices
+/// and triangles that were removed leave no gaps.
 pub(super) fn edit_guarded(
     mesh: &mut HalfEdgeMesh,
     edit: impl Fn(&mut HalfEdgeMesh, &dyn Fn(u32) -> bool),
@@ -80,7 +81,7 @@ pub(super) fn edit_guarded(
         let snapshot = edited.snapshot();
         let cut = self_intersections(&snapshot);
         if cut.is_empty() {
-            *mesh = edited;
+            *mesh = edited.compacted();
             return;
         }
         let mut guilty = involved(&snapshot, &cut);

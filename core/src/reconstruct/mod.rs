@@ -11,9 +11,11 @@ mod field;
 mod guard;
 mod shape;
 mod support;
+mod topology;
+mod votes;
 mod winding;
 
-use crate::geometry::{Cloud, Vec3};
+use crate::geometry::{Cloud, Vec3, median};
 use crate::mesh::{HalfEdgeMesh, Mesh};
 use crate::scans::Support;
 use crate::{Progress, Result};
@@ -51,7 +53,8 @@ crate::params! {
         edge_length: f64 = 0.0, in [0.0, 1.0], unit "m";
         /// Edge length at the start of detailing (`l_0`), in units of the voxel edge.
         start_edge: f64 = 1.3, in [0.5, 10.0];
-        /// Voxel edge of the inflation (`l`); 0 takes the finished mesh's edge length.
+        /// Voxel edge of the inflation (`l`), for the field the distance between the corners of its lattice; 0 takes it
+        /// from the distance and the noise of the points.
         voxel_edge: f64 = 0.0, in [0.0, 1.0], unit "m";
         /// Steps from the first to the finished edge length (`i_max`).
         iterations: usize = 4, in [0, 1000];
@@ -77,6 +80,8 @@ pub(crate) struct Scale {
     pub points: f64,
     /// Edge of a voxel.
     pub voxel: f64,
+    /// Distance between the corners of the field's lattice.
+    pub lattice: f64,
     /// Edge of the finished mesh.
     pub edge: f64,
     /// Edge at the start of detailing.
@@ -86,13 +91,25 @@ pub(crate) struct Scale {
 /// Edges per distance of points: with shorter ones the mesh would follow single points' noise.
 const EDGE_PER_SPACING: f64 = 1.6;
 
+/// Distance of the lattice's corners as a share of the narrowest wall or slot that the points can tell: one corner
+/// must fall between its sides.
+const LATTICE_PER_GAP: f64 = 0.8;
+/// That wall is one distance of the points thick, less so many standard deviations: noise moves both sides.
+const MIN_GAP_SIGMAS: f64 = 3.0;
+/// Distance of the lattice's corners per distance of points at least, however noisy these are.
+const MIN_LATTICE_PER_SPACING: f64 = 0.4;
+
 impl Scale {
     fn of(cloud: &Cloud, params: &ReconstructParams) -> Scale {
         let points = spacing(cloud);
         let given = |value: f64, automatic: f64| if value > 0.0 { value } else { automatic };
         let edge = given(params.edge_length, EDGE_PER_SPACING * points);
         let voxel = given(params.voxel_edge, edge.max(1.2 * points));
-        Scale { points, voxel, edge, start_edge: (params.start_edge * voxel).max(edge) }
+        let sigma = median(cloud.sigma.iter().copied().filter(|s| s.is_finite()).collect());
+        let gap = points - MIN_GAP_SIGMAS * sigma.unwrap_or(0.0);
+        let finest = MIN_LATTICE_PER_SPACING * points;
+        let lattice = given(params.voxel_edge, (LATTICE_PER_GAP * gap).max(finest).min(edge));
+        Scale { points, voxel, lattice, edge, start_edge: (params.start_edge * voxel).max(edge) }
     }
 
     /// Width of the search for points round a vertex while edges have length `edge`.
@@ -106,8 +123,7 @@ fn spacing(cloud: &Cloud) -> f64 {
     let tree = crate::geometry::KdTree::new(&cloud.points);
     let stride = cloud.len().div_ceil(2000).max(1);
     let fourth = |p: &Vec3| tree.nearest_n(p, 5).last().map(|n| n.1.sqrt());
-    crate::geometry::median(cloud.points.iter().step_by(stride).filter_map(fourth).collect())
-        .unwrap_or(1e-3)
+    median(cloud.points.iter().step_by(stride).filter_map(fourth).collect()).unwrap_or(1e-3)
 }
 
 /// A closed, two-manifold, oriented mesh without self-intersections round the volume that the points enclose, with
@@ -132,7 +148,7 @@ pub fn reconstruct(cloud: &Cloud, params: &ReconstructParams, progress: &Progres
     };
     let inflated = match params.inflate {
         InflateMethod::Field => {
-            field::inflate(cloud, scale.voxel, scale.points, params.components, progress)?
+            field::inflate(cloud, scale.lattice, scale.points, params.components, progress)?
         }
         InflateMethod::Thesis => balloon::inflate(cloud, scale.voxel, progress)?,
     };

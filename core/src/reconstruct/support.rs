@@ -1,6 +1,6 @@
 //! The plane that the object stands on: it can't be seen, yet it is known, so it counts as surface.
 
-use super::winding::Winding;
+use super::winding::{Winding, areas};
 use crate::geometry::{Aabb, Cloud, Vec3};
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ pub(super) fn with_support_plane(cloud: &Cloud, spacing: f64) -> Cloud {
             cloud.support[i],
         );
     }
-    let winding = Winding::new(&doubled, spacing);
+    let winding = Winding::new(&doubled, &areas(&doubled, spacing), spacing);
     let bounds = Aabb::of(&cloud.points);
     let steps = [0, 1].map(|i| (bounds.extent()[i] / spacing).ceil() as usize);
     let place = |index: usize| {

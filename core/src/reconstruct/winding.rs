@@ -32,9 +32,8 @@ struct Node {
 }
 
 impl Winding {
-    /// `spacing` is the distance between the points, metres.
-    pub(super) fn new(cloud: &Cloud, spacing: f64) -> Winding {
-        let areas = areas(cloud, spacing);
+    /// The winding number of `cloud`'s points, which stand for `areas` (square metres) and lie `spacing` (metres) apart.
+    pub(super) fn new(cloud: &Cloud, areas: &[f64], spacing: f64) -> Winding {
         let mut order: Vec<usize> = (0..cloud.len()).collect();
         let mut nodes = Vec::new();
         build(&cloud.points, &mut order, 0, &mut nodes);
@@ -89,7 +88,7 @@ impl Winding {
 
 /// The area that each point stands for: that of the disc to its neighbours, divided among them; at most what
 /// the spacing allows three times over, so that lone points do not weigh like a surface.
-fn areas(cloud: &Cloud, spacing: f64) -> Vec<f64> {
+pub(super) fn areas(cloud: &Cloud, spacing: f64) -> Vec<f64> {
     let tree = KdTree::new(&cloud.points);
     let largest = 3.0 * spacing * spacing;
     let area = |i: usize| {
@@ -155,7 +154,7 @@ mod tests {
     #[test]
     fn one_inside_and_zero_outside_a_sphere() {
         let (cloud, spacing) = sphere(5000, 0.0);
-        let winding = Winding::new(&cloud, spacing);
+        let winding = Winding::new(&cloud, &areas(&cloud, spacing), spacing);
         for (z, expected) in [(0.0, 1.0), (0.5, 1.0), (0.85, 1.0), (1.15, 0.0), (2.0, 0.0)] {
             let value = winding.at(&Vec3::new(0.01, 0.02, z));
             assert!((value - expected).abs() < 0.05, "{z}: {value}");
@@ -166,7 +165,7 @@ mod tests {
     #[test]
     fn the_tree_agrees_with_the_plain_sum() {
         let (cloud, spacing) = sphere(3000, 0.2);
-        let winding = Winding::new(&cloud, spacing);
+        let winding = Winding::new(&cloud, &areas(&cloud, spacing), spacing);
         for query in [Vec3::new(0.3, 0.1, 0.2), Vec3::new(0.1, 0.0, -0.9), Vec3::new(1.2, 0.4, 0.0)]
         {
             let plain = (0..winding.points.len()).map(|i| winding.near(i, &query)).sum::<f64>();
