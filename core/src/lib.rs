@@ -20,6 +20,8 @@ pub mod filter;
 
 pub mod reconstruct;
 
+pub mod verdict;
+
 pub mod pipeline;
 
 pub mod view;

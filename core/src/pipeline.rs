@@ -7,6 +7,7 @@ use crate::mesh::io::{Unit, read_cloud_in};
 use crate::reconstruct::{ReconstructParams, reconstruct};
 use crate::register::{PreparedScan, RegisterParams, Registration, Status, register};
 use crate::scans::{PoseSigma, ScanSource, Support};
+use crate::verdict::{ModelVerdict, ScanCount};
 use crate::{Error, Progress, Result};
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -160,6 +161,8 @@ pub struct Outcome {
     pub registration: Option<Registration>,
     /// Names of the views, empty for a single cloud.
     pub names: Vec<String>,
+    /// Whether the mesh is to be trusted.
+    pub verdict: ModelVerdict,
 }
 
 /// From input to mesh. What the scans say of the object's support counts unless `params` say something else.
@@ -170,6 +173,7 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
     let files = match input {
         Input::Cloud(cloud) => {
             let mesh = reconstruct(cloud, &params.reconstruct, progress)?;
+            let verdict = ModelVerdict::new(None, cloud, &mesh);
             let (cloud, measurements) = (cloud.clone(), cloud.len());
             return Ok(Outcome {
                 mesh,
@@ -177,6 +181,7 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
                 measurements,
                 registration: None,
                 names: Vec::new(),
+                verdict,
             });
         }
         Input::Scans(files) => files,
@@ -189,7 +194,9 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
         of_reconstruct.support = files.support;
     }
     let mesh = reconstruct(&filtered.cloud, &of_reconstruct, progress)?;
+    let scans = ScanCount::from_verdicts(&registration.verdicts);
     Ok(Outcome {
+        verdict: ModelVerdict::new(scans, &filtered.cloud, &mesh),
         mesh,
         cloud: filtered.cloud,
         measurements: filtered.measurements,
