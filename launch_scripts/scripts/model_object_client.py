@@ -35,6 +35,8 @@ def main():
     parser.add_argument('--name', default='object', help='a name for the object')
     parser.add_argument('--max-scans', type=int, default=0, help='0: as configured')
     parser.add_argument('--coverage', type=float, default=0.0, help='0 to 1; 0: as configured')
+    parser.add_argument('--force', action='store_true',
+                        help='write the mesh also where it is not trustworthy')
     options = parser.parse_args(rclpy.utilities.remove_ros_args(sys.argv)[1:])
 
     rclpy.init()
@@ -51,6 +53,7 @@ def main():
         goal.object_name = options.name
         goal.max_scans = options.max_scans
         goal.coverage = options.coverage
+        goal.force = options.force
         future = client.send_goal_async(goal, feedback_callback=tell)
         rclpy.spin_until_future_complete(node, future)
         handle = future.result()
@@ -63,8 +66,12 @@ def main():
             sys.exit(f'{result.error_msg} (code {result.error_code})')
         print(
             f'{result.mesh_path}: {result.vertices} vertices, {result.triangles} triangles from '
-            f'{result.scans} scans, coverage {result.coverage:.1%}, {result.seconds:.0f} s'
+            f'{result.scans} scans ({result.share_of_scans_accepted:.1%} accepted), '
+            f'{result.share_of_cells_explained:.1%} of the measured surface explained, '
+            f'coverage {result.coverage:.1%}, {result.seconds:.0f} s'
         )
+        if result.error_msg:
+            print(f'warning: {result.error_msg}', file=sys.stderr)
     except KeyboardInterrupt:
         if handle is not None:
             rclpy.spin_until_future_complete(
