@@ -13,7 +13,6 @@ pub use params::{MeshParams, Params};
 
 use anyhow::Result;
 use puffer_core::geometry::Cloud;
-use puffer_core::mesh::Mesh;
 use puffer_core::pipeline::cloud_hash;
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
 use puffer_shell::bulk::{BulkSubscription, Delivery};
@@ -21,14 +20,15 @@ use puffer_shell::convert::cloud_from_message;
 use puffer_shell::{Node, RosArgs, Stop};
 use std::sync::Arc;
 use tokio::sync::Mutex;
+use work::Model;
 
 /// What the node holds.
 #[derive(Default)]
 pub(crate) struct Desk {
     /// The newest filtered cloud, with its hash.
     pub cloud: Option<(Arc<Cloud>, String)>,
-    /// The newest mesh.
-    pub mesh: Option<Arc<Mesh>>,
+    /// The newest mesh, written or not.
+    pub model: Option<Arc<Model>>,
 }
 
 /// Runs the reconstructor until `stop`.

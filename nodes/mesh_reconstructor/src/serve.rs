@@ -1,12 +1,12 @@
 //! The services and the action.
 
 use crate::marker::mesh_marker;
-use crate::work::{Made, failure, make, within_region};
+use crate::work::{HOW_TO_FORCE, Made, Model, failure, make, share_message, within_region};
 use crate::{Desk, Params, paths};
 use anyhow::Result;
 use puffer_core::Progress;
 use puffer_core::mesh::io::write_mesh;
-use puffer_core::pipeline::comments;
+use puffer_core::verdict::ScanCount;
 use puffer_msgs::action::{
     ReconstructMesh, ReconstructMeshFeedback, ReconstructMeshGoal, ReconstructMeshResult,
 };
@@ -49,6 +49,8 @@ struct Wanted {
     cloud_hash: String,
     /// Edges of the region of interest, as in `ReconstructMesh.action`.
     roi: Vector3,
+    /// Of how many scans the cloud was made, if that is known.
+    scans: Option<ScanCount>,
 }
 
 pub(crate) fn all(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
@@ -94,9 +96,9 @@ impl Counter {
         let params = self.node.params();
         let made = tokio::task::block_in_place(|| {
             let cloud = cloud.map(|cloud| within_region(cloud, &wanted.roi)).transpose()?;
-            make(request, cloud.as_deref(), &params, progress)
+            make(request, cloud.as_deref(), wanted.scans, &params, progress)
         });
-        let Made { mesh, response } = match made {
+        let Made { model, response } = match made {
             Ok(made) => made,
             Err(response) => {
                 if response.error_code == ReconstructResponse::CANCELLED {
@@ -107,33 +109,43 @@ impl Counter {
                 return *response;
             }
         };
+        if response.success {
+            self.publish(&model, &params.scan.object_frame).await;
+            tracing::info!(
+                "{} vertices, genus {}, closed {}, {:.1} s, {}: {}",
+                response.vertices,
+                response.genus,
+                response.closed,
+                response.seconds,
+                model.verdict.summary(),
+                response.mesh_path
+            );
+        } else {
+            tracing::error!("no mesh: {}", response.message);
+        }
+        self.desk.lock().await.model = Some(Arc::new(model));
+        response
+    }
+
+    /// Publishes a mesh and its marker.
+    async fn publish(&self, model: &Model, frame: &str) {
         let (sec, nanosec) = self.node.now().parts();
-        let frame_id = params.scan.object_frame;
-        let header = Header { stamp: Time { sec, nanosec }, frame_id };
-        let marker = mesh_marker(&mesh, header.clone(), self.markers.most_bytes());
+        let header = Header { stamp: Time { sec, nanosec }, frame_id: frame.to_owned() };
+        let marker = mesh_marker(&model.mesh, header.clone(), self.markers.most_bytes());
         let shown = marker.points.len() / 3;
-        if shown < mesh.triangles.len() {
-            tracing::debug!("model_marker shows {shown} triangles of {}", mesh.triangles.len());
+        let triangles = model.mesh.triangles.len();
+        if shown < triangles {
+            tracing::debug!("model_marker shows {shown} triangles of {triangles}");
         }
         if let Err(error) = self.markers.publish(&marker) {
             tracing::warn!("{error}");
         }
-        let message = mesh_message(&mesh, header);
+        let message = mesh_message(&model.mesh, header);
         if let Err(error) = self.meshes.publish_message(&message).await {
             tracing::error!("the mesh is written, but not published: {error}");
         } else if let Err(error) = self.meshes.flush(FLUSH_DEADLINE).await {
             tracing::warn!("{error}");
         }
-        self.desk.lock().await.mesh = Some(Arc::new(mesh));
-        tracing::info!(
-            "{} vertices, genus {}, closed {}, {:.1} s: {}",
-            response.vertices,
-            response.genus,
-            response.closed,
-            response.seconds,
-            response.mesh_path
-        );
-        response
     }
 
     /// Waits for the cloud with the hash; any if it is empty.
@@ -177,8 +189,10 @@ impl Counter {
             input: asked.input.clone(),
             output_path: asked.output_path.clone(),
             edge_length: asked.edge_length,
+            force: asked.force,
         };
-        let wanted = Wanted { cloud_hash: asked.cloud_hash.clone(), roi: asked.roi };
+        let scans = ScanCount::new(asked.scans as usize, asked.accepted as usize);
+        let wanted = Wanted { cloud_hash: asked.cloud_hash.clone(), roi: asked.roi, scans };
         let response = self.reconstruct(&request, &wanted, &progress).await;
         watch.abort();
         let (success, code) = (response.success, response.error_code);
@@ -191,24 +205,39 @@ impl Counter {
     }
 
     async fn save(&self, request: &SaveMeshRequest) -> SaveMeshResponse {
-        let saved = self.try_to_save(request).await;
-        match saved {
-            Ok(message) => SaveMeshResponse { success: true, error_code: 0, message },
-            Err(message) => SaveMeshResponse { success: false, error_code: 1, message },
+        let model = self.desk.lock().await.model.clone();
+        let verdict = model.as_ref().map(|model| model.verdict).unwrap_or_default();
+        let saved = self.try_to_save(request, model.as_deref());
+        let (error_code, message) = match saved {
+            Ok(message) => (SaveMeshResponse::NONE, message),
+            Err(fault) => fault,
+        };
+        SaveMeshResponse {
+            success: error_code == SaveMeshResponse::NONE,
+            error_code,
+            message,
+            share_of_scans_accepted: share_message(verdict.scans.map(|scans| scans.share())),
+            share_of_cells_explained: share_message(verdict.cells_explained),
         }
     }
 
-    async fn try_to_save(&self, request: &SaveMeshRequest) -> std::result::Result<String, String> {
-        let params = self.node.params().mesh;
-        let path = paths::within(&params.output_folder, &request.path)?;
-        let (mesh, cloud) = {
-            let desk = self.desk.lock().await;
-            (desk.mesh.clone(), desk.cloud.clone())
-        };
-        let mesh = mesh.ok_or("there is no mesh yet: call reconstruct first")?;
-        let comments = cloud.map(|(cloud, _)| comments(&cloud, params.seed as u64));
-        write_mesh(&path, &mesh, comments.as_ref().map_or(&[], |c| &c[..]))
-            .map_err(|error| error.to_string())?;
+    /// The path of the file, or what kept it from being written.
+    fn try_to_save(
+        &self,
+        request: &SaveMeshRequest,
+        model: Option<&Model>,
+    ) -> std::result::Result<String, (u16, String)> {
+        let failed = |text: String| (SaveMeshResponse::FAILED, text);
+        let folder = self.node.params().mesh.output_folder;
+        let path = paths::within(&folder, &request.path).map_err(failed)?;
+        let model =
+            model.ok_or_else(|| failed("there is no mesh yet: call reconstruct first".into()))?;
+        if let Some(reason) = model.verdict.distrust().filter(|_| !request.force) {
+            let text = format!("{reason}; {HOW_TO_FORCE}");
+            return Err((SaveMeshResponse::NOT_TRUSTWORTHY, text));
+        }
+        write_mesh(&path, &model.mesh, &model.comments)
+            .map_err(|error| failed(error.to_string()))?;
         Ok(path.display().to_string())
     }
 }
@@ -226,5 +255,9 @@ fn as_result(response: ReconstructResponse) -> ReconstructMeshResult {
         mean_sigma: response.mean_sigma,
         unobserved_share: response.unobserved_share,
         seconds: response.seconds,
+        scans: response.scans,
+        accepted: response.accepted,
+        share_of_scans_accepted: response.share_of_scans_accepted,
+        share_of_cells_explained: response.share_of_cells_explained,
     }
 }

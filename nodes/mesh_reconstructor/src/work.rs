@@ -7,6 +7,7 @@ use puffer_core::mesh::{Mesh, genus, is_closed, is_oriented, is_two_manifold};
 use puffer_core::pipeline::{self, Poses, comments};
 use puffer_core::reconstruct::reconstruct;
 use puffer_core::scans::ScanSource;
+use puffer_core::verdict::{ModelVerdict, ScanCount};
 use puffer_core::{Error, Progress};
 use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::srv::{ReconstructRequest, ReconstructResponse};
@@ -19,19 +20,30 @@ use std::time::Instant;
 /// The codes of `Reconstruct.srv`.
 type Codes = ReconstructResponse;
 
-/// A mesh and what is said of it.
-pub(crate) struct Made {
+/// A mesh with all that a file of it tells.
+pub(crate) struct Model {
     pub mesh: Mesh,
+    pub verdict: ModelVerdict,
+    /// The lines of comment in its file.
+    pub comments: Vec<String>,
+}
+
+/// A mesh and what is said of it. It is written if the response is a success.
+pub(crate) struct Made {
+    pub model: Model,
     pub response: ReconstructResponse,
 }
 
-/// Carries a request out; `cloud` is the current filtered cloud.
+/// Carries a request out; `cloud` is the current filtered cloud, made of `scans` if that is known.
+///
+/// A mesh that is not trustworthy is written only if the request says so.
 ///
 /// # Errors
-/// The response that tells what was wrong.
+/// The response that tells why there is no mesh.
 pub(crate) fn make(
     request: &ReconstructRequest,
     cloud: Option<&Cloud>,
+    scans: Option<ScanCount>,
     params: &Params,
     progress: &Progress,
 ) -> Result<Made, Box<ReconstructResponse>> {
@@ -46,7 +58,7 @@ pub(crate) fn make(
             .set("edge_length", &value)
             .map_err(|error| failure(Codes::BAD_INPUT, error.to_string()))?;
     }
-    let (mesh, cloud) = if request.input.is_empty() {
+    let (mesh, cloud, verdict) = if request.input.is_empty() {
         let cloud = cloud.ok_or_else(|| {
             failure(
                 Codes::NO_CLOUD,
@@ -54,16 +66,33 @@ pub(crate) fn make(
             )
         })?;
         let mesh = reconstruct(cloud, &params.reconstruct, progress).map_err(of_error)?;
-        (mesh, cloud.clone())
+        let verdict = ModelVerdict::new(scans, cloud, &mesh);
+        (mesh, cloud.clone(), verdict)
     } else {
         from_file(Path::new(&request.input), &params, progress).map_err(of_error)?
     };
-    write_mesh(&path, &mesh, &comments(&cloud, params.mesh.seed as u64)).map_err(of_error)?;
-    let mut response = described(&mesh);
-    response.mesh_path = path.display().to_string();
+    let comments = comments(&cloud, params.mesh.seed as u64).to_vec();
+    let model = Model { mesh, verdict, comments };
+    let mut response = described(&model);
+    match (model.verdict.distrust(), request.force) {
+        (Some(reason), false) => {
+            response.error_code = Codes::NOT_TRUSTWORTHY;
+            response.message = format!("{reason}; {HOW_TO_FORCE}");
+        }
+        (distrust, _) => {
+            write_mesh(&path, &model.mesh, &model.comments).map_err(of_error)?;
+            response.success = true;
+            response.mesh_path = path.display().to_string();
+            response.message = distrust.unwrap_or_default();
+        }
+    }
     response.seconds = since.elapsed().as_secs_f32();
-    Ok(Made { mesh, response })
+    Ok(Made { model, response })
 }
+
+/// What whoever wants a mesh that is not trustworthy can do.
+pub(crate) const HOW_TO_FORCE: &str = "the mesh is not written: call mesh_reconstructor's \
+     save_mesh with force to have it all the same";
 
 /// What of a cloud lies within the region of interest; all of it if its edges are 0.
 ///
@@ -88,7 +117,7 @@ fn from_file(
     input: &Path,
     params: &Params,
     progress: &Progress,
-) -> puffer_core::Result<(Mesh, Cloud)> {
+) -> puffer_core::Result<(Mesh, Cloud, ModelVerdict)> {
     let of_registrar =
         RegistrarParams { scan: params.scan.clone(), register: params.register.clone() };
     let input = if is_bag(input) {
@@ -108,27 +137,42 @@ fn from_file(
         reconstruct: params.reconstruct.clone(),
     };
     let outcome = pipeline::run(&input, Poses::Robot, &stages, progress)?;
-    Ok((outcome.mesh, outcome.cloud))
+    Ok((outcome.mesh, outcome.cloud, outcome.verdict))
 }
 
-/// What a response says of a mesh.
-fn described(mesh: &Mesh) -> ReconstructResponse {
+/// What a response says of a mesh, but whether it is written.
+fn described(model: &Model) -> ReconstructResponse {
+    let Model { mesh, verdict, .. } = model;
     let measured: Vec<f64> = mesh.sigma.iter().copied().filter(|s| s.is_finite()).collect();
     let unobserved = mesh.observed.iter().filter(|o| !**o).count();
     ReconstructResponse {
-        success: true,
         vertices: mesh.vertices.len() as u32,
         triangles: mesh.triangles.len() as u32,
         genus: genus(mesh).and_then(|g| i32::try_from(g).ok()).unwrap_or(-1),
         closed: is_closed(mesh) && is_two_manifold(mesh) && is_oriented(mesh),
         mean_sigma: (measured.iter().sum::<f64>() / measured.len().max(1) as f64) as f32,
         unobserved_share: unobserved as f32 / mesh.vertices.len().max(1) as f32,
+        scans: verdict.scans.map_or(0, |scans| scans.all() as u32),
+        accepted: verdict.scans.map_or(0, |scans| scans.accepted() as u32),
+        share_of_scans_accepted: share_message(verdict.scans.map(|scans| scans.share())),
+        share_of_cells_explained: share_message(verdict.cells_explained),
         ..ReconstructResponse::default()
     }
 }
 
+/// A share as messages hold it: NaN if it is not known.
+pub(crate) fn share_message(share: Option<f64>) -> f32 {
+    share.map_or(f32::NAN, |share| share as f32)
+}
+
 pub(crate) fn failure(error_code: u16, message: String) -> Box<ReconstructResponse> {
-    Box::new(ReconstructResponse { error_code, message, ..ReconstructResponse::default() })
+    Box::new(ReconstructResponse {
+        error_code,
+        message,
+        share_of_scans_accepted: f32::NAN,
+        share_of_cells_explained: f32::NAN,
+        ..ReconstructResponse::default()
+    })
 }
 
 fn of_error(error: Error) -> Box<ReconstructResponse> {

@@ -3,7 +3,7 @@
 use crate::Params;
 use crate::goal::Modeller;
 use anyhow::{Result, anyhow, bail};
-use puffer_msgs::geometry_msgs::msg::Vector3;
+use puffer_msgs::action::ReconstructMeshGoal;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::Node;
 use std::sync::Arc;
@@ -47,8 +47,13 @@ impl Modeller {
         let refined = self.partners.refine(self.inbox.len(), &stop).await?;
         // Scans that came meanwhile are not in the revision, but must not be missed by the filter either.
         let filtered = self.partners.filter(self.inbox.len(), refined.revision).await?;
-        let mesh =
-            self.partners.reconstruct(&filtered.cloud_hash, &Vector3::default(), &stop).await?;
+        let goal = ReconstructMeshGoal {
+            cloud_hash: filtered.cloud_hash,
+            scans: self.inbox.len() as u32,
+            accepted: refined.accepted,
+            ..ReconstructMeshGoal::default()
+        };
+        let mesh = self.partners.reconstruct(goal, &stop).await?;
         if !mesh.success {
             return Err(anyhow!(mesh.error_msg));
         }

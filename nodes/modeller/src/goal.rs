@@ -8,9 +8,12 @@ use crate::runner::{End, Runner, phase_constant};
 use anyhow::Result;
 use puffer_core::geometry::Aabb;
 use puffer_core::session::{Event, Outcome as Ended, Phase, SessionParams, State};
-use puffer_msgs::action::{ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult};
+use puffer_msgs::action::{
+    ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult, ReconstructMeshResult,
+};
 use puffer_msgs::builtin_interfaces::msg::{Duration as DurationMessage, Time};
 use puffer_msgs::msg::ModellingStatus;
+use puffer_msgs::srv::ReconstructResponse;
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::convert::region_from_message;
 use puffer_shell::{Goal, Node, Outcome, Publisher};
@@ -88,14 +91,18 @@ impl Modeller {
         }
         self.inbox.clear();
         let journal = Journal::begin(&params, self.node.now())?;
-        let roi = goal.request().roi;
-        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, roi);
+        let asked = goal.request().clone();
+        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, asked);
         let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
         let end = runner.run(session(&params, goal.request()), first, controls, told).await;
         runner.report(&end)?;
         let mesh = &runner.mesh;
+        let verdict = runner.verdict_on_all(&end);
+        let share = |share: Option<f64>| share.map_or(f32::NAN, |share| share as f32);
         let result = ModelObjectResult {
             success: mesh.success,
+            error_code: error_code_of(&end.outcome, mesh),
+            error_msg: mesh.error_msg.clone(),
             mesh_path: mesh.mesh_path.clone(),
             vertices: mesh.vertices,
             triangles: mesh.triangles,
@@ -108,7 +115,9 @@ impl Modeller {
             scans: end.state.scans as u32,
             coverage: end.state.coverage as f32,
             reason: end.state.reason.clone(),
-            ..ModelObjectResult::default()
+            accepted: verdict.scans.map_or(0, |scans| scans.accepted() as u32),
+            share_of_scans_accepted: share(verdict.scans.map(|scans| scans.share())),
+            share_of_cells_explained: share(verdict.cells_explained),
         };
         Ok((end, result))
     }
@@ -173,20 +182,26 @@ fn finished(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResul
             Outcome::Succeeded(result)
         }
         Ended::Cancelled => {
-            result.error_code = ModelObjectResult::CANCELLED;
             result.error_msg = "cancelled".to_owned();
             Outcome::Canceled(result)
         }
-        Ended::Failed(phase, why) => {
+        Ended::Failed(_, why) => {
             tracing::error!("{why}");
-            result.error_code = code_of(phase);
             result.error_msg = why;
             Outcome::Aborted(result)
         }
     }
 }
 
-fn code_of(phase: Phase) -> u16 {
+fn error_code_of(outcome: &Ended, mesh: &ReconstructMeshResult) -> u16 {
+    let phase = match outcome {
+        Ended::Modelled(_) => return ModelObjectResult::NONE,
+        Ended::Cancelled => return ModelObjectResult::CANCELLED,
+        Ended::Failed(_, _) if mesh.error_code == ReconstructResponse::NOT_TRUSTWORTHY => {
+            return ModelObjectResult::NOT_TRUSTWORTHY;
+        }
+        Ended::Failed(phase, _) => phase,
+    };
     match phase {
         Phase::Preparing | Phase::Paused | Phase::Done => ModelObjectResult::NO_DRIVER,
         Phase::Planning | Phase::Moving => ModelObjectResult::MOTION,
@@ -199,4 +214,22 @@ fn code_of(phase: Phase) -> u16 {
 fn failed(error_code: u16, error_msg: String) -> Outcome<ModelObjectResult> {
     tracing::error!("{error_msg}");
     Outcome::Aborted(ModelObjectResult { error_code, error_msg, ..ModelObjectResult::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_that_is_not_trustworthy_has_a_code_of_its_own() {
+        let code = |error_code: u16, outcome: Ended| {
+            error_code_of(&outcome, &ReconstructMeshResult { error_code, ..Default::default() })
+        };
+        let failed = || Ended::Failed(Phase::Reconstructing, "why".into());
+        let refused = ReconstructResponse::NOT_TRUSTWORTHY;
+        assert_eq!(code(refused, failed()), ModelObjectResult::NOT_TRUSTWORTHY);
+        assert_eq!(code(0, failed()), ModelObjectResult::RECONSTRUCTION);
+        assert_eq!(code(0, Ended::Modelled("enough".into())), ModelObjectResult::NONE);
+        assert_eq!(code(0, Ended::Cancelled), ModelObjectResult::CANCELLED);
+    }
 }

@@ -6,9 +6,9 @@ use puffer_msgs::action::{
     ReconstructMesh, ReconstructMeshGoal, ReconstructMeshResult, Refine, RefineGoal, RefineResult,
 };
 use puffer_msgs::control_msgs::action::{FollowJointTrajectory, FollowJointTrajectoryGoal};
-use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::srv::{
     Filter, FilterRequest, FilterResponse, PlanView, PlanViewRequest, PlanViewResponse,
+    ReconstructResponse,
 };
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerRequest};
 use puffer_msgs::trajectory_msgs::msg::JointTrajectory;
@@ -171,21 +171,21 @@ impl Partners {
         Ok(response)
     }
 
+    /// Has the mesh made; that it is not trustworthy, and not written, is no error.
     pub(crate) async fn reconstruct(
         &self,
-        cloud_hash: &str,
-        roi: &Vector3,
+        mut goal: ReconstructMeshGoal,
         stop: &Stop,
     ) -> Result<ReconstructMeshResult> {
-        let goal = ReconstructMeshGoal {
-            output_path: self.node.params().modeller.mesh_path,
-            cloud_hash: cloud_hash.to_owned(),
-            roi: *roi,
-            ..ReconstructMeshGoal::default()
-        };
+        goal.output_path = self.node.params().modeller.mesh_path;
         let handle = send(&self.reconstruct, &goal).await?;
         match ended(&handle, self.deadline(|p| p.reconstruct_deadline), stop).await? {
             Outcome::Succeeded(result) => Ok(result),
+            Outcome::Aborted(result)
+                if result.error_code == ReconstructResponse::NOT_TRUSTWORTHY =>
+            {
+                Ok(result)
+            }
             Outcome::Aborted(result) | Outcome::Canceled(result) => Err(anyhow!(result.error_msg)),
         }
     }

@@ -6,8 +6,8 @@ use crate::journal::Journal;
 use crate::partners::Partners;
 use anyhow::{Result, anyhow};
 use puffer_core::session::{Command, Event, Outcome, Phase, SessionParams, State, step};
-use puffer_msgs::action::ReconstructMeshResult;
-use puffer_msgs::geometry_msgs::msg::Vector3;
+use puffer_core::verdict::{ModelVerdict, ScanCount};
+use puffer_msgs::action::{ModelObjectGoal, ReconstructMeshGoal, ReconstructMeshResult};
 use puffer_msgs::srv::PlanViewRequest;
 use puffer_msgs::trajectory_msgs::msg::JointTrajectory;
 use puffer_shell::convert::status_from_message;
@@ -24,10 +24,13 @@ pub(crate) struct Runner<'a> {
     pub journal: Journal,
     /// The way to the planned view.
     trajectory: JointTrajectory,
-    /// Edges of the region of interest, as the goal has them.
-    roi: Vector3,
+    goal: ModelObjectGoal,
     revision: u32,
+    /// Scans that came before the poses were refined, and those of them that were accepted then.
+    scans: usize,
+    accepted: usize,
     cloud_hash: String,
+    /// What was said of the mesh: of the last one that was written, if there is one.
     pub mesh: ReconstructMeshResult,
 }
 
@@ -43,7 +46,7 @@ impl<'a> Runner<'a> {
         partners: &'a Partners,
         inbox: &'a Inbox,
         journal: Journal,
-        roi: Vector3,
+        goal: ModelObjectGoal,
     ) -> Runner<'a> {
         Runner {
             node,
@@ -51,8 +54,10 @@ impl<'a> Runner<'a> {
             inbox,
             journal,
             trajectory: JointTrajectory::default(),
-            roi,
+            goal,
             revision: 0,
+            scans: 0,
+            accepted: 0,
             cloud_hash: String::new(),
             mesh: ReconstructMeshResult::default(),
         }
@@ -154,7 +159,7 @@ impl<'a> Runner<'a> {
             scans: scans as u32,
             revision: self.revision,
             point_factor: factor as u32,
-            roi: self.roi,
+            roi: self.goal.roi,
             ..PlanViewRequest::default()
         };
         let plan = self.partners.plan(&request).await?;
@@ -193,6 +198,7 @@ impl<'a> Runner<'a> {
     async fn refine(&mut self, scans: usize, stop: &Stop) -> Result<Event> {
         let refined = self.partners.refine(scans, stop).await?;
         self.revision = refined.revision;
+        (self.scans, self.accepted) = (scans, refined.accepted as usize);
         Ok(Event::Finished)
     }
 
@@ -203,28 +209,60 @@ impl<'a> Runner<'a> {
     }
 
     async fn reconstruct(&mut self, stop: &Stop) -> Result<Event> {
-        let mesh = self.partners.reconstruct(&self.cloud_hash, &self.roi, stop).await?;
+        let goal = ReconstructMeshGoal {
+            cloud_hash: self.cloud_hash.clone(),
+            roi: self.goal.roi,
+            scans: self.scans as u32,
+            accepted: self.accepted as u32,
+            force: self.goal.force,
+            ..ReconstructMeshGoal::default()
+        };
+        let mesh = self.partners.reconstruct(goal, stop).await?;
+        if mesh.success || !self.mesh.success {
+            self.mesh = mesh.clone();
+        }
         if !mesh.success {
             return Err(anyhow!("{}", mesh.error_msg));
         }
-        self.mesh = mesh;
-        Ok(Event::Reconstructed { sigma: f64::from(self.mesh.mean_sigma) })
+        if !mesh.error_msg.is_empty() {
+            tracing::warn!("{}", mesh.error_msg);
+        }
+        Ok(Event::Reconstructed { sigma: f64::from(mesh.mean_sigma) })
+    }
+
+    /// The verdict on the whole of a run that ended.
+    pub(crate) fn verdict_on_all(&self, end: &End) -> ModelVerdict {
+        let mesh = &self.mesh;
+        if mesh.scans == 0 {
+            // It did not come to a mesh: what is known is told.
+            let scans = ScanCount::new(end.state.scans, end.state.accepted);
+            return ModelVerdict { scans, cells_explained: None };
+        }
+        let explained = Some(f64::from(mesh.share_of_cells_explained));
+        ModelVerdict {
+            scans: ScanCount::new(mesh.scans as usize, mesh.accepted as usize),
+            cells_explained: explained.filter(|share| share.is_finite()),
+        }
     }
 
     /// Writes the report of a run that ended.
     pub(crate) fn report(&mut self, end: &End) -> Result<()> {
         self.keep()?;
-        let mut facts = Map::new();
+        let verdict = self.verdict_on_all(end);
+        let mut facts = verdict.facts();
         let (outcome, reason) = match &end.outcome {
             Outcome::Modelled(reason) => ("modelled", reason.clone()),
+            Outcome::Failed(..) if !self.mesh.success && self.mesh.vertices > 0 => {
+                ("not trustworthy", end.state.reason.clone())
+            }
             Outcome::Failed(phase, reason) => ("failed", format!("{phase:?}: {reason}")),
             Outcome::Cancelled => ("cancelled", "on request".to_owned()),
         };
         for (key, value) in [
             ("outcome", json!(outcome)),
             ("reason", json!(reason)),
-            ("scans", json!(end.state.scans)),
-            ("accepted_scans", json!(end.state.accepted)),
+            ("scans", json!(verdict.scans.map_or(end.state.scans, |scans| scans.all()))),
+            ("accepted_scans", json!(verdict.scans.map_or(0, |scans| scans.accepted()))),
             ("coverage", json!(end.state.coverage)),
             ("mesh", mesh_facts(&self.mesh)),
         ] {
