@@ -10,6 +10,7 @@ mod progress;
 mod run;
 mod setups;
 mod table;
+mod verdict;
 
 use clap::Parser;
 use commands::Command;

@@ -48,13 +48,21 @@ impl Evaluate {
     }
 }
 
+/// Rows that stand first and together: how far the mesh lies off the truth says little of a mesh that
+/// leaves out most of the object, so completeness stands beside it.
+const FIRST_ROWS: [&str; 3] = ["crms_rms", "accuracy_rms", "completeness_rms"];
+
 fn print(assessment: &Assessment, json: bool) -> Result<()> {
     let value = serde_json::to_value(assessment)?;
     if json {
         println!("{value}");
         return Ok(());
     }
-    let rows = value.as_object().into_iter().flatten().map(|(key, value)| {
+    let mut figures: Vec<(&String, &Value)> = value.as_object().into_iter().flatten().collect();
+    figures.sort_by_key(|(key, _)| {
+        FIRST_ROWS.iter().position(|first| first == key).unwrap_or(FIRST_ROWS.len())
+    });
+    let rows = figures.into_iter().map(|(key, value)| {
         let text = match value {
             Value::Null => "-".to_owned(),
             Value::Number(n) if n.is_f64() => format!("{:.4}", n.as_f64().unwrap_or(f64::NAN)),

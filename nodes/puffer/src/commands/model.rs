@@ -43,6 +43,10 @@ pub struct Model {
     /// Record no bag
     #[arg(long)]
     no_bag: bool,
+    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of the
+    /// measured surface is explained by it
+    #[arg(long)]
+    force: bool,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -78,6 +82,7 @@ impl Model {
             one_process: self.one_process,
             domain: self.domain,
             bag: !self.no_bag,
+            force: self.force,
         };
         Run::new(plan)?.model(self.json)
     }

@@ -4,6 +4,7 @@ use super::input::{InputArgs, Job, check_output};
 use crate::parameters::ParameterArgs;
 use crate::progress::Watch;
 use crate::table::Report;
+use crate::verdict;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::mesh::io::write_mesh;
@@ -26,6 +27,10 @@ pub struct Reconstruct {
     /// Seed for whatever is left to chance [default: that of the run that a bag came from, or 0]
     #[arg(long)]
     seed: Option<u64>,
+    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of the
+    /// measured surface is explained by it
+    #[arg(long)]
+    force: bool,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -39,13 +44,17 @@ impl Reconstruct {
         let outcome =
             self.input.named(run(&data, self.input.poses(), &params, watch.progress()))?;
         let times = watch.finish();
-        let comments = comments(&outcome.cloud, self.seed.or(seed).unwrap_or(0));
-        write_mesh(&self.output, &outcome.mesh, &comments)?;
-        self.report(&outcome, &times).print(self.json);
-        Ok(())
+        let how = "call again with --force to have it all the same";
+        let passed = verdict::pass(&outcome.verdict, self.force, how);
+        if passed.is_ok() {
+            let comments = comments(&outcome.cloud, self.seed.or(seed).unwrap_or(0));
+            write_mesh(&self.output, &outcome.mesh, &comments)?;
+        }
+        self.report(&outcome, &times, passed.is_ok()).print(self.json);
+        passed
     }
 
-    fn report(&self, outcome: &Outcome, times: &[(String, Duration)]) -> Report {
+    fn report(&self, outcome: &Outcome, times: &[(String, Duration)], written: bool) -> Report {
         let mut report = Report::default();
         registration_rows(&mut report, outcome);
         let points = outcome.cloud.len();
@@ -66,12 +75,10 @@ impl Reconstruct {
         if let Some(peak) = peak_memory() {
             report.add("peak memory", format!("{:.2} GB", peak / 1e9), "peak_memory_bytes", peak);
         }
-        report.add(
-            "written",
-            self.output.display().to_string(),
-            "mesh",
-            self.output.display().to_string(),
-        );
+        let path = written.then(|| self.output.display().to_string());
+        let text = path.as_deref().unwrap_or("no mesh");
+        report.add("written", text, "mesh", path.clone());
+        verdict::add(&mut report, &outcome.verdict);
         report
     }
 }
@@ -81,7 +88,6 @@ fn registration_rows(report: &mut Report, outcome: &Outcome) {
     let total = registration.verdicts.len();
     let accepted = registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
     report.add("scans", format!("{accepted} of {total} accepted"), "accepted_scans", accepted);
-    report.add_value("scans", total);
     for (name, verdict) in outcome.names.iter().zip(&registration.verdicts) {
         if verdict.status != Status::Accepted {
             eprintln!("puffer: {name} {}: {}", verdict.status.word(), verdict.reason);
@@ -98,6 +104,11 @@ fn mesh_rows(report: &mut Report, mesh: &Mesh) {
     let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
     report.add("mesh", format!("{vertices} vertices, {triangles} triangles"), "vertices", vertices);
     report.add_value("triangles", triangles);
+    let size = mesh.aabb().extent() * 1e3;
+    let volume = mesh.volume() * 1e6;
+    let text = format!("{:.1} x {:.1} x {:.1} mm, {volume:.1} cm3", size.x, size.y, size.z);
+    report.add("size", text, "size_mm", vec![size.x, size.y, size.z]);
+    report.add_value("volume_cm3", volume);
     let (closed, manifold, oriented) = (is_closed(mesh), is_two_manifold(mesh), is_oriented(mesh));
     let (genus, components) = (genus(mesh), components(mesh));
     let text = format!(

@@ -4,12 +4,14 @@ use super::input::{InputArgs, Job, check_output};
 use crate::parameters::ParameterArgs;
 use crate::progress::Watch;
 use crate::table::Report;
+use crate::verdict;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::geometry::log;
 use puffer_core::pipeline::{prepare, register_scans};
-use puffer_core::register::{Status, Verdict};
+use puffer_core::register::Verdict;
 use puffer_core::scans::write_poses;
+use puffer_core::verdict::{ModelVerdict, ScanCount};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -58,14 +60,10 @@ impl Register {
             );
             report.add(&prepared.names[i], text, &prepared.names[i], verdict.status.word());
         }
-        let accepted =
-            registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
-        report.add(
-            "accepted",
-            format!("{accepted} of {}", files.len()),
-            "accepted_scans",
-            accepted,
-        );
+        let scans = ScanCount::from_verdicts(&registration.verdicts);
+        report.add_value("accepted_scans", scans.map(|scans| scans.accepted()));
+        let on_the_whole = ModelVerdict { scans, cells_explained: None };
+        verdict::add(&mut report, &on_the_whole);
         let residual = registration.residual * 1e3;
         report.add(
             "residual",
@@ -76,7 +74,8 @@ impl Register {
         let seconds: f64 = times.iter().map(|(_, time)| time.as_secs_f64()).sum();
         report.add("time", format!("{seconds:.1} s"), "seconds", seconds);
         report.print(self.json);
-        Ok(())
+        // The poses are what was asked for, and each tells its verdict: nothing is held back.
+        verdict::pass(&on_the_whole, true, "")
     }
 }
 

@@ -16,14 +16,19 @@ const CANCEL_DEADLINE: Duration = Duration::from_secs(30);
 pub(crate) enum Ending {
     Modelled,
     Cancelled,
+    /// There is no mesh, because it would not be trustworthy; why.
+    NotTrustworthy(String),
     Failed(String),
 }
 
 /// Sends the goal, tells how it goes, and waits for its end. When `stop` is set, the goal is cancelled.
-pub(crate) async fn pursue(node: &Node<NoParams>, object: &str, stop: &Stop) -> Result<Ending> {
+pub(crate) async fn pursue(
+    node: &Node<NoParams>,
+    goal: &ModelObjectGoal,
+    stop: &Stop,
+) -> Result<Ending> {
     let client = node.action_client::<ModelObject>("model_object")?;
-    let goal = ModelObjectGoal { object_name: object.to_owned(), ..ModelObjectGoal::default() };
-    let sent = match stop.or(client.send(&goal, ACCEPT_DEADLINE)).await {
+    let sent = match stop.or(client.send(goal, ACCEPT_DEADLINE)).await {
         Some(sent) => sent,
         None => return Ok(Ending::Cancelled),
     };
@@ -61,6 +66,11 @@ pub(crate) async fn pursue(node: &Node<NoParams>, object: &str, stop: &Stop) -> 
     Ok(match handle.result(RUN_DEADLINE).await? {
         Outcome::Succeeded(_) => Ending::Modelled,
         Outcome::Canceled(_) => Ending::Cancelled,
+        Outcome::Aborted(ModelObjectResult {
+            error_code: ModelObjectResult::NOT_TRUSTWORTHY,
+            error_msg,
+            ..
+        }) => Ending::NotTrustworthy(error_msg),
         Outcome::Aborted(ModelObjectResult { error_code, error_msg, .. }) => {
             Ending::Failed(format!("{error_msg} (code {error_code})"))
         }

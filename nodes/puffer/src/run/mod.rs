@@ -9,12 +9,15 @@ mod table;
 use crate::fleet::{Crew, Fleet};
 use crate::nodes::NODES;
 use crate::setups::{Setting, output, parameter_file};
+use crate::verdict;
 use anyhow::{Context, Result, anyhow, bail};
 use folder::RunFolder;
 use goal::{Ending, pursue};
 use puffer_core::Error;
 use puffer_core::assess::Assessment;
 use puffer_core::mesh::Mesh;
+use puffer_core::verdict::ModelVerdict;
+use puffer_msgs::action::ModelObjectGoal;
 use puffer_shell::scans::PARAMETER_NOTE;
 use puffer_shell::{NoParams, Node, RosArgs, Stop, domain};
 use recorder::Recorder;
@@ -35,6 +38,8 @@ pub(crate) struct Plan {
     pub one_process: bool,
     pub domain: Option<u16>,
     pub bag: bool,
+    /// Whether a mesh is wanted that is not trustworthy.
+    pub force: bool,
 }
 
 /// A run whose folder is made.
@@ -91,7 +96,12 @@ impl Run {
         match ending {
             Ending::Modelled => {
                 table::print(&report, assessment.as_ref(), self.folder.path(), json);
-                Ok(())
+                self.judge(&report, true)
+            }
+            Ending::NotTrustworthy(why) => {
+                table::print(&report, None, self.folder.path(), json);
+                self.judge(&report, false)?;
+                Err(anyhow!(why))
             }
             Ending::Cancelled => {
                 eprintln!(
@@ -104,6 +114,16 @@ impl Run {
                 Err(anyhow!("{why}; what was measured is in {}", self.folder.path().display()))
             }
         }
+    }
+
+    /// Tells what the verdict on the whole says against the model, as a warning if there is a mesh.
+    fn judge(&self, report: &Map<String, Value>, has_mesh: bool) -> Result<()> {
+        let folder = self.folder.path().display();
+        let how = format!(
+            "what was measured is in {folder}, and puffer reconstruct {folder}/scans -o mesh.ply --force makes a mesh \
+             of it all the same"
+        );
+        verdict::pass(&ModelVerdict::from_facts(report), has_mesh, &how)
     }
 
     /// Starts the nodes, pursues the goal, and stops them again; what they had to complain of at the end.
@@ -161,7 +181,12 @@ impl Run {
         // Its own stop: Ctrl-C cancels the goal first, and the goal needs the node.
         let args = RosArgs::parse(std::iter::empty())?.with_domain(self.domain);
         let node: Node<NoParams> = Node::start("puffer_model", args, Stop::new()).await?;
-        pursue(&node, &self.plan.object, stop).await
+        let goal = ModelObjectGoal {
+            object_name: self.plan.object.clone(),
+            force: self.plan.force,
+            ..ModelObjectGoal::default()
+        };
+        pursue(&node, &goal, stop).await
     }
 
     /// What the report says beside the modeller's part.

@@ -1,7 +1,9 @@
 //! The table of results.
 
 use crate::table::Report;
+use crate::verdict;
 use puffer_core::assess::Assessment;
+use puffer_core::verdict::ModelVerdict;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -27,6 +29,7 @@ pub(crate) fn print(
     table.add("scans", text, "scans", scans);
     table.add_value("accepted_scans", accepted);
     table.add_value("voxel_edge_mm", edge * 1e3);
+    verdict::add(&mut table, &ModelVerdict::from_facts(report));
     let why = report.get("reason").and_then(Value::as_str).unwrap_or_default();
     let text = format!("{:.1} % of the known surface; ended: {why}", number("coverage") * 100.0);
     table.add("coverage", text, "coverage", number("coverage"));
@@ -57,16 +60,17 @@ fn figures(table: &mut Report, found: &Assessment) {
     table.add_value("genus", topology.genus);
     table.add_value("components", topology.components);
     table.add_value("self_intersecting_faces", topology.self_intersecting_faces);
-    let text = format!("{:.3} mm (mean {:.3} mm)", found.crms_rms, found.crms_mean);
-    table.add("cRMS", text, "crms_rms", found.crms_rms);
-    table.add_value("crms_mean", found.crms_mean);
+    let (accuracy, completeness) = (found.aligned.accuracy_rms, found.aligned.completeness_rms);
     let seen = found.completeness_seen_rms;
-    let whole = found.aligned.completeness_rms;
-    let text = match seen {
-        Some(seen) => format!("{seen:.3} mm on what was seen, {whole:.3} mm on all"),
-        None => format!("{whole:.3} mm"),
-    };
-    table.add("completeness", text, "completeness_rms", whole);
+    let on_seen = seen.map_or_else(String::new, |seen| format!(" ({seen:.3} mm of what was seen)"));
+    let text = format!(
+        "cRMS {:.3} mm, accuracy {accuracy:.3} mm, completeness {completeness:.3} mm{on_seen}",
+        found.crms_rms
+    );
+    table.add("deviation, rms", text, "crms_rms", found.crms_rms);
+    table.add_value("crms_mean", found.crms_mean);
+    table.add_value("accuracy_rms", accuracy);
+    table.add_value("completeness_rms", completeness);
     table.add_value("completeness_seen_rms", seen);
     let text = format!("{:.2} mm", found.aligned.hausdorff);
     table.add("Hausdorff", text, "hausdorff", found.aligned.hausdorff);
