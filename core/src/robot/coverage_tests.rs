@@ -23,7 +23,7 @@ fn coverage(setup: &str, sensor: &SensorModel, elevations: &[f64]) -> f64 {
             asked += 1;
             match cell.reach(&request).unwrap() {
                 Reach::Reached(_) => reached += 1,
-                Reach::Refused { reason } => println!("{elevation} {azimuth}: {reason}"),
+                Reach::Refused { reason, .. } => println!("{elevation} {azimuth}: {reason}"),
             }
         }
     }

@@ -28,7 +28,7 @@ mod workcell;
 pub use collision::Obstacle;
 pub use description::{SETUPS, description, home};
 pub use model::{Joint, JointKind, LinkShape, RobotModel};
-pub use reach::{Reach, ReachRequest, Reached, slide_range};
+pub use reach::{Hindrance, Reach, ReachRequest, Reached, slide_range};
 pub use self_filter::BodyFilter;
 pub use timing::Trajectory;
 pub use workcell::Workcell;

@@ -34,9 +34,39 @@ pub enum Reach {
     Reached(Box<Reached>),
     /// It cannot: the whole family (roll, distance, ways of bending the arm) was tried.
     Refused {
+        /// What the members of the family that came farthest failed at.
+        hindrance: Hindrance,
         /// Why, in words.
         reason: String,
     },
+}
+
+/// What keeps the robot from a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hindrance {
+    /// The robot stands in a collision already.
+    Start,
+    /// No joint positions within the limits take the view.
+    Limits,
+    /// Those that take it collide.
+    Collision,
+    /// From those that stand free, the sensor cannot sweep.
+    Sweep,
+    /// To those that stand free, no free way was found.
+    Way,
+}
+
+impl Hindrance {
+    /// Said of a view.
+    pub fn words(self) -> &'static str {
+        match self {
+            Hindrance::Start => "not asked, since the robot stands in a collision",
+            Hindrance::Limits => "out of reach",
+            Hindrance::Collision => "in collision",
+            Hindrance::Sweep => "without room for the sweep",
+            Hindrance::Way => "without a free way",
+        }
+    }
 }
 
 /// How a view is taken.
@@ -101,6 +131,7 @@ impl Workcell {
         let space = self.space(&collisions, request.margin);
         if let Some(pair) = space.blocked(request.start, request.start) {
             return Ok(Reach::Refused {
+                hindrance: Hindrance::Start,
                 reason: format!(
                     "the robot stands in a collision: {} are {:.1} mm apart; move it by hand",
                     space.describe(&pair),
@@ -118,7 +149,7 @@ impl Workcell {
                 return Ok(Reach::Reached(Box::new(reached)));
             }
         }
-        Ok(Reach::Refused { reason: failures.reason() })
+        Ok(Reach::Refused { hindrance: failures.hindrance(), reason: failures.reason() })
     }
 
     /// The first member that stands free, can sweep and has a straight way; else one of the first of them that a
@@ -196,6 +227,15 @@ impl Workcell {
 }
 
 impl Failures {
+    fn hindrance(&self) -> Hindrance {
+        match self {
+            Failures { paths: 1.., .. } => Hindrance::Way,
+            Failures { sweeping: 1.., .. } => Hindrance::Sweep,
+            Failures { members: 1.., .. } => Hindrance::Collision,
+            _ => Hindrance::Limits,
+        }
+    }
+
     fn reason(&self) -> String {
         let Failures { members, colliding, sweeping, paths, .. } = self;
         if *members == 0 {

@@ -221,7 +221,7 @@ fn refusals_say_why() {
     let cell = cell("kr16_laser");
     let (home, obstacle) = (home("kr16_laser").unwrap(), object());
     let refusal = |request: &ReachRequest| match cell.reach(request).unwrap() {
-        Reach::Refused { reason } => reason,
+        Reach::Refused { reason, .. } => reason,
         Reach::Reached(reached) => panic!("{:?}", reached.q),
     };
     let far = request(view(&Vec3::x(), 3.0), &home, &obstacle);

@@ -27,14 +27,14 @@ impl Eye {
 /// How many rays of a simulated scan met what.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Met {
-    /// Known surface, with nothing hidden before it.
+    /// Known surface that faces the sensor, with nothing hidden before it.
     pub surface: usize,
     /// Hidden voxels first.
     pub hidden: usize,
 }
 
 impl Met {
-    /// Share of the rays into the object that meet known surface.
+    /// Share of the rays into the object that meet known surface. Shadow that hides no surface is not the object.
     pub(crate) fn overlap(&self) -> f64 {
         self.surface as f64 / (self.surface + self.hidden).max(1) as f64
     }
@@ -60,7 +60,7 @@ pub(crate) fn look(
                 State::Free => {}
                 State::Excluded => break,
                 State::Occupied => {
-                    met.surface += usize::from(!hidden);
+                    met.surface += usize::from(!hidden && cell.faces(&along));
                     let fresh = !seen.contains(step.slot);
                     if fresh
                         && (!space.lacks_points(cell) || witnessed(space, pose, ray, step.slot))

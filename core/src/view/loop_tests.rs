@@ -60,9 +60,9 @@ fn covered(space: &ViewSpace, points: &[Vec3]) -> f64 {
     points.iter().filter(near).count() as f64 / points.len() as f64
 }
 
-fn above_table(pose: &Pose) -> Result<ReachedView, String> {
+fn above_table(pose: &Pose) -> Result<ReachedView, RefusedView> {
     match pose.translation.z < 0.0 {
-        true => Err("below the table".to_owned()),
+        true => Err(RefusedView { kind: "below", reason: "below the table".to_owned() }),
         false => Ok(ReachedView { pose: *pose, duration: 1.0 }),
     }
 }

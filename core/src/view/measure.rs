@@ -21,6 +21,8 @@ const LOG_PASS: f64 = -0.405;
 pub(crate) struct Gain {
     /// N: surface voxels that lack points.
     pub lacking: usize,
+    /// Of those, the ones beside a voxel that has its points.
+    pub beside: usize,
     /// M: possible inside and border voxels.
     pub hidden: usize,
     /// O: unknown voxels.
@@ -34,7 +36,9 @@ pub(crate) struct Gain {
 impl Gain {
     /// What decides whether there is anything left to do: N and M, weighted.
     pub(crate) fn new_voxels(&self, params: &ViewParams) -> f64 {
-        params.weight_occupied * self.lacking as f64 + params.weight_inside * self.hidden as f64
+        let lacking =
+            (self.lacking - self.beside) as f64 + params.beside_share * self.beside as f64;
+        params.weight_occupied * lacking + params.weight_inside * self.hidden as f64
     }
 }
 
@@ -72,7 +76,9 @@ impl<'a> Judge<'a> {
         let mut gain = Gain::default();
         let (mut entropy_sum, mut quality, mut surface) = (0.0, 0.0, 0usize);
         let met = look(self.space, &self.eye, pose, seen, |slot, cell, along| {
-            gain.lacking += usize::from(self.space.lacks_points(cell));
+            let lacking = self.space.lacks_points(cell);
+            gain.lacking += usize::from(lacking);
+            gain.beside += usize::from(lacking && cell.beside);
             gain.hidden += usize::from(self.space.hides(cell));
             gain.unknown += usize::from(cell.state == State::Unknown);
             match measure {

@@ -7,6 +7,7 @@
 mod candidates;
 mod carve;
 mod cell;
+mod ending;
 mod first;
 mod look;
 mod measure;
@@ -15,8 +16,9 @@ mod plan;
 mod space;
 
 pub use cell::{Counts, State};
+pub use ending::{Cause, Ending};
 pub use params::{Measure, Utility, ViewParams};
-pub use plan::{Candidate, ChosenView, Plan, ReachedView, next_view};
+pub use plan::{Candidate, ChosenView, Plan, ReachedView, RefusedView, next_view};
 pub use space::ViewSpace;
 
 use crate::geometry::{Pose, Vec3};

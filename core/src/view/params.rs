@@ -40,10 +40,15 @@ crate::params! {
         min_points: usize = 5, in [1, 10000];
         /// Weight of surface voxels that lack points.
         weight_occupied: f64 = 1.0, in [0.0, 1000.0];
+        /// What a surface voxel that lacks points counts for beside one that has them, as a share of `weight_occupied`; 1
+        /// in the thesis.
+        beside_share: f64 = 0.5, in [0.0, 1.0];
         /// Weight of possible inside and possible border voxels.
         weight_inside: f64 = 0.5, in [0.0, 1000.0];
-        /// Weight of unknown voxels.
-        weight_unknown: f64 = 0.01, in [0.0, 1000.0];
+        /// Possible inside and border voxels count within so many voxels of a surface voxel; 0: all, as in the thesis.
+        hidden_reach: usize = 3, in [0, 20];
+        /// Weight of unknown voxels; 0.01 in the thesis.
+        weight_unknown: f64 = 0.0, in [0.0, 1000.0];
         /// Distance of viewpoints from the surface; 0 takes the sensor's working distance.
         working_distance: f64 = 0.0, in [0.0, 10.0], unit "m";
         /// Radius in voxels within which possible inside voxels give a candidate its direction.
@@ -62,8 +67,8 @@ crate::params! {
         utility: Utility = Utility::Gain;
         /// Time of a scan, added to that of the motion where gain per second counts.
         scan_time: f64 = 5.0, in [0.1, 1000.0], unit "s";
-        /// Share of the rays into the object that must meet known surface, for registration.
-        min_overlap: f64 = 0.2, in [0.0, 1.0];
+        /// Share of the rays into the object that must meet known surface as a sensor measures it, for registration.
+        min_overlap: f64 = 0.1, in [0.0, 1.0];
         /// Planning ends when no view gains this share of the known surface voxels; 0 wants the last one.
         min_gain: f64 = 0.005, in [0.0, 1.0];
         /// Scans that look at a voxel in vain before it counts as not measurable.

@@ -2,6 +2,7 @@
 
 use super::candidates::{candidates, is_used};
 use super::cell::Counts;
+use super::ending::{Cause, Ending};
 use super::first::{predefined, spread};
 use super::measure::{Gain, Judge, scramble};
 use super::space::ViewSpace;
@@ -16,6 +17,15 @@ pub struct ReachedView {
     pub pose: Pose,
     /// Duration of the motion, seconds.
     pub duration: f64,
+}
+
+/// Why the robot does not take a viewpoint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefusedView {
+    /// The kind, as it is said of a view: "out of reach".
+    pub kind: &'static str,
+    /// With all that is known.
+    pub reason: String,
 }
 
 /// A view that was considered.
@@ -39,6 +49,8 @@ pub struct Candidate {
     pub reachable: bool,
     /// Why not, or why it was not taken; empty if nothing speaks against it.
     pub reason: String,
+    /// The kind of why not, if the robot refuses it.
+    pub refusal: Option<&'static str>,
 }
 
 /// The next view.
@@ -63,15 +75,15 @@ pub struct Plan {
     pub chosen: Option<ChosenView>,
     /// What was considered, best first.
     pub candidates: Vec<Candidate>,
-    /// Share of the known surface voxels that hold their minimum of points, 0 to 1.
+    /// [`Counts::coverage`].
     pub coverage: f64,
     /// Numbers of voxels.
     pub counts: Counts,
     /// Why no view is left.
-    pub done: Option<String>,
+    pub done: Option<Ending>,
 }
 
-type Reach<'a> = &'a mut dyn FnMut(&Pose) -> Result<ReachedView, String>;
+type Reach<'a> = &'a mut dyn FnMut(&Pose) -> Result<ReachedView, RefusedView>;
 
 /// Plans the next view. `reach` says whether and how the robot can take a viewpoint, or why it cannot; it is
 /// asked in the order of worth until no better answer is possible.
@@ -107,25 +119,16 @@ fn first_view(space: &ViewSpace, counts: Counts, reach: Reach<'_>) -> Plan {
     let views = predefined(&space.roi().center(), space.params.distance(&space.sensor));
     for pose in views.into_iter().filter(|pose| !is_used(space, pose)) {
         let mut candidate = Candidate::new(pose, &Gain::default());
-        candidate.asked = true;
-        let answer = reach(&pose);
-        candidate.reachable = answer.is_ok();
-        candidate.reason = answer.as_ref().err().cloned().unwrap_or_default();
+        let answer = candidate.ask(reach);
         plan.candidates.push(candidate);
-        if let Ok(ReachedView { pose, duration }) = answer {
+        if let Some(ReachedView { pose, duration }) = answer {
             let candidate = plan.candidates.len() - 1;
             let (gain, expected_new) = (0.0, 0);
             plan.chosen = Some(ChosenView { pose, candidate, gain, expected_new, duration });
             return plan;
         }
     }
-    plan.done = Some(match space.scans() {
-        0 => format!("none of {} predefined views can be reached", plan.candidates.len()),
-        n => format!(
-            "no surface was measured in the region of interest in {n} scans, and no predefined view is left: \
-             check the region and the poses"
-        ),
-    });
+    plan.done = Some(Ending::at_first(&plan.candidates, space.scans()));
     plan
 }
 
@@ -141,6 +144,22 @@ impl Candidate {
             asked: false,
             reachable: false,
             reason: String::new(),
+            refusal: None,
+        }
+    }
+
+    /// Asks the robot and notes the answer.
+    fn ask(&mut self, reach: Reach<'_>) -> Option<ReachedView> {
+        self.asked = true;
+        match reach(&self.pose) {
+            Ok(reached) => {
+                self.reachable = true;
+                Some(reached)
+            }
+            Err(RefusedView { kind, reason }) => {
+                (self.refusal, self.reason) = (Some(kind), reason);
+                None
+            }
         }
     }
 }
@@ -154,7 +173,7 @@ struct Choice<'a> {
 
 impl Choice<'_> {
     fn choose(&self, considered: Vec<(Pose, Gain)>, counts: Counts, reach: Reach<'_>) -> Plan {
-        let coverage = counts.satisfied as f64 / counts.occupied.max(1) as f64;
+        let coverage = counts.coverage();
         let useful = |gain: &Gain| gain.new_voxels(&self.space.params) >= self.floor;
         let total = considered.len();
         let mut left: Vec<(Pose, Gain)> =
@@ -166,15 +185,19 @@ impl Choice<'_> {
         let mut candidates: Vec<Candidate> =
             left.iter().map(|(pose, gain)| Candidate::new(*pose, gain)).collect();
         let chosen = self.ask(&mut candidates, reach);
+        let least = self.floor.max(1.0);
         let done = chosen.is_none().then(|| match (total, candidates.len()) {
-            (0, _) => "no voxel asks to be seen from anywhere but views already used".to_owned(),
-            (_, 0) => format!(
-                "none of {total} candidates sees surface that lacks points or hidden space beyond {:.1} voxels",
-                self.floor.max(1.0)
+            (0, _) => Ending::new(
+                Cause::NothingAsks,
+                "no voxel asks to be seen from anywhere but views already used".to_owned(),
             ),
-            (_, useful) => {
-                format!("none of the {useful} views that would show something new can be taken")
-            }
+            (_, 0) => Ending::new(
+                Cause::NotWorthIt,
+                format!(
+                    "none of {total} candidates sees surface that lacks points or hidden space beyond {least:.1} voxels"
+                ),
+            ),
+            _ => Ending::of(&candidates, least),
         });
         Plan { chosen, candidates, coverage, counts, done }
     }
@@ -220,15 +243,7 @@ impl Choice<'_> {
                     break;
                 }
             }
-            candidate.asked = true;
-            let reached = match reach(&candidate.pose) {
-                Ok(reached) => reached,
-                Err(reason) => {
-                    candidate.reason = reason;
-                    continue;
-                }
-            };
-            candidate.reachable = true;
+            let Some(reached) = candidate.ask(reach) else { continue };
             let gain = self.judge.gain(&reached.pose, &mut set);
             if !self.is_baseline() && gain.new_voxels(params) < self.floor {
                 candidate.reason = "shows nothing new from where the robot can take it".to_owned();

@@ -5,7 +5,7 @@ use super::carve::{Carved, carve, see_past};
 use super::cell::{Cell, Counts, State};
 use super::look::{Eye, look};
 use crate::geometry::{Aabb, Pose, Scan, SensorModel, Vec3};
-use crate::voxel::{BlockGrid, SlotSet};
+use crate::voxel::{BlockGrid, SlotSet, Voxel};
 use crate::{Error, Result};
 
 /// The voxel space of the view planner (Wiedemann 2014, §2.1 and §2.2.1).
@@ -106,6 +106,11 @@ impl ViewSpace {
         self.marked.push(*object_from_sensor);
     }
 
+    /// Forgets the views marked by [`ViewSpace::mark_used`].
+    pub fn forget_marks(&mut self) {
+        self.marked.clear();
+    }
+
     /// Number of scans taken in.
     pub fn scans(&self) -> usize {
         self.scans
@@ -143,7 +148,7 @@ impl ViewSpace {
     /// Numbers of voxels by what is known of them.
     pub fn counts(&self) -> Counts {
         let mut counts = Counts::default();
-        for (_, cell) in self.grid.iter() {
+        for (slot, cell) in self.grid.iter() {
             let given_up = self.given_up(cell);
             match cell.state {
                 State::Unknown => {}
@@ -151,19 +156,24 @@ impl ViewSpace {
                 State::Occupied => {
                     counts.occupied += 1;
                     counts.satisfied += usize::from(self.satisfied(cell));
+                    counts.covered += usize::from(cell.beside);
                     counts.unmeasurable += usize::from(given_up && !self.satisfied(cell));
                 }
                 State::PossibleInside => counts.possible_inside += 1,
                 State::PossibleBorder => counts.possible_border += 1,
                 State::Excluded => counts.excluded += 1,
             }
-            let hidden = matches!(cell.state, State::PossibleInside | State::PossibleBorder);
-            counts.unresolved += usize::from(hidden && given_up);
+            counts.unresolved += usize::from(cell.is_hidden() && given_up);
+            counts.frontier += usize::from(self.hides(cell) && self.borders_on_free(slot));
         }
         let hidden = counts.possible_inside + counts.possible_border;
         let told = counts.free + counts.occupied + hidden + counts.excluded;
         counts.unknown = self.grid.voxels() - told;
         counts
+    }
+
+    fn borders_on_free(&self, slot: u32) -> bool {
+        self.grid.neighbours(slot).any(|near| self.grid.get(near).state == State::Free)
     }
 
     /// Poses of all views that are not to be repeated.
@@ -184,9 +194,9 @@ impl ViewSpace {
         cell.state == State::Occupied && !self.satisfied(cell) && !self.given_up(cell)
     }
 
-    /// Whether a voxel is one of M: hidden so far, and not looked at in vain too often.
+    /// Whether a voxel is one of M: hidden so far, where surface may be, and not looked at in vain too often.
     pub(crate) fn hides(&self, cell: &Cell) -> bool {
-        matches!(cell.state, State::PossibleInside | State::PossibleBorder) && !self.given_up(cell)
+        cell.is_hidden() && (cell.near || self.params.hidden_reach == 0) && !self.given_up(cell)
     }
 
     /// Middle of the surface measured so far, object frame, metres; that of the region of interest if there is
@@ -251,6 +261,8 @@ impl ViewSpace {
             }
         }
         self.find_borders(&hidden);
+        self.find_near();
+        self.look_round_surface();
     }
 
     fn find_borders(&mut self, hidden: &[u32]) {
@@ -270,6 +282,55 @@ impl ViewSpace {
         }
         for slot in borders.iter() {
             self.grid.get_mut(slot).state = State::PossibleBorder;
+        }
+    }
+
+    /// Marks the hidden voxels within reach of a surface voxel. A shadow goes on to the end of the region, the object
+    /// does not: surface that was not seen yet adjoins what was seen.
+    fn find_near(&mut self) {
+        let reach = self.params.hidden_reach as i32;
+        let row = |y: i32, z: i32| (-reach..=reach).map(move |x| [x, y, z]);
+        let ball: Vec<Voxel> = (-reach..=reach)
+            .flat_map(|z| (-reach..=reach).flat_map(move |y| row(y, z)))
+            .filter(|[x, y, z]| x * x + y * y + z * z <= reach * reach)
+            .collect();
+        let mut near = SlotSet::new(self.grid.slots());
+        for (slot, _) in self.grid.iter().filter(|(_, cell)| cell.state == State::Occupied) {
+            let [x, y, z] = self.grid.voxel(slot);
+            for [dx, dy, dz] in &ball {
+                if let Some(slot) = self.grid.slot([x + dx, y + dy, z + dz]) {
+                    near.insert(slot);
+                }
+            }
+        }
+        let hidden = self.grid.iter().filter(|(_, cell)| cell.is_hidden());
+        let hidden: Vec<u32> = hidden.map(|(slot, _)| slot).collect();
+        for slot in hidden {
+            self.grid.get_mut(slot).near = near.contains(slot);
+        }
+    }
+
+    /// Notes of each surface voxel which side is outward, and whether one that has its points touches it. A surface that
+    /// cuts a corner off a voxel, or noise, leaves a few points beside those that show the same surface.
+    fn look_round_surface(&mut self) {
+        let mut beside = SlotSet::new(self.grid.slots());
+        for (slot, _) in self.grid.iter().filter(|(_, cell)| self.satisfied(cell)) {
+            let [x, y, z] = self.grid.voxel(slot);
+            for i in 0..27 {
+                if let Some(near) =
+                    self.grid.slot([x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
+                {
+                    beside.insert(near);
+                }
+            }
+        }
+        let surface = self.grid.iter().filter(|(_, cell)| cell.state == State::Occupied);
+        let surface: Vec<u32> = surface.map(|(slot, _)| slot).collect();
+        for slot in surface {
+            let outward = super::candidates::outward(self, slot);
+            let cell = self.grid.get_mut(slot);
+            cell.set_outward(outward);
+            cell.beside = beside.contains(slot);
         }
     }
 

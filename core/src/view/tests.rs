@@ -23,8 +23,12 @@ fn plate(half: f64, z: f64) -> Scan {
     Scan { points: steps.map(at).map(|p| p.map(|v| v as f32)).collect(), ..Scan::default() }
 }
 
-fn any(pose: &Pose) -> Result<ReachedView, String> {
+fn any(pose: &Pose) -> Result<ReachedView, RefusedView> {
     Ok(ReachedView { pose: *pose, duration: 1.0 })
+}
+
+fn no(kind: &'static str) -> Result<ReachedView, RefusedView> {
+    Err(RefusedView { kind, reason: format!("{kind} by 3 mm") })
 }
 
 #[test]
@@ -103,7 +107,7 @@ fn what_is_looked_at_in_vain_stops_asking() {
         judge.gain(&side, &mut judge.set()).hidden
     };
     let first = asking(&space);
-    assert!(first > 1000, "{first}");
+    assert!(first > 300, "{first}");
     // The border was looked at from above once already.
     space.integrate(&nothing, &side).unwrap();
     assert_eq!(asking(&space), first);
@@ -138,13 +142,19 @@ fn the_first_view_is_the_first_predefined_one_that_can_be_reached() {
     let mut space = space(&ViewParams::default());
     let mut left_only = |pose: &Pose| match pose.translation.x < -0.1 {
         true => any(pose),
-        false => Err("arm too short".to_owned()),
+        false => no("too far"),
     };
     let plan = next_view(&space, &mut left_only);
     let chosen = plan.chosen.unwrap();
     assert!(chosen.pose.translation.x < -0.1 && chosen.candidate > 0);
     assert!(plan.candidates[..chosen.candidate].iter().all(|c| c.asked && !c.reachable));
-    assert_eq!(plan.candidates[0].reason, "arm too short");
+    assert_eq!(plan.candidates[0].reason, "too far by 3 mm");
+    let done = next_view(&space, &mut |_| no("too far")).done.unwrap();
+    assert_eq!(
+        (done.cause, done.refusals.as_slice()),
+        (Cause::NoFirstView, &[("too far", 42)][..])
+    );
+    assert!(done.text.contains("none of 42") && done.text.contains("42 too far"), "{}", done.text);
     // Nothing measured: the next one, until none is left.
     let mut views = 0;
     let done = loop {
@@ -153,7 +163,7 @@ fn the_first_view_is_the_first_predefined_one_that_can_be_reached() {
                 space.integrate(&Scan::default(), &view.pose).unwrap();
                 views += 1;
             }
-            plan => break plan.done.unwrap(),
+            plan => break plan.done.unwrap().text,
         }
     };
     assert_eq!(views, 42);
@@ -169,7 +179,7 @@ fn a_plan_takes_the_best_that_can_be_reached_and_says_why_not_the_others() {
     assert_eq!(free.candidates.iter().filter(|c| c.asked).count(), 1);
     assert!(best.gain > 0.0 && best.expected_new > 100 && free.done.is_none());
     let mut no_best = |pose: &Pose| match *pose == best.pose {
-        true => Err("collides".to_owned()),
+        true => no("in collision"),
         false => any(pose),
     };
     let other = next_view(&space, &mut no_best).chosen.unwrap();
@@ -178,9 +188,112 @@ fn a_plan_takes_the_best_that_can_be_reached_and_says_why_not_the_others() {
     let away = looking_along(&(Vec3::x() * 2.0), &Vec3::x());
     let plan = next_view(&space, &mut |_| Ok(ReachedView { pose: away, duration: 1.0 }));
     assert!(plan.chosen.is_none() && plan.candidates[0].reason.contains("nothing new"));
-    let plan = next_view(&space, &mut |_| Err("no".to_owned()));
-    assert!(plan.done.unwrap().contains("can be taken"));
-    assert!(plan.candidates.iter().all(|c| c.asked && c.reason == "no"));
+}
+
+#[test]
+fn what_the_robot_refuses_and_what_is_not_worth_it_are_told_apart() {
+    let mut space = space(&ViewParams::default());
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    // The robot takes nothing.
+    let plan = next_view(&space, &mut |_| no("out of reach"));
+    assert!(plan.candidates.iter().all(|c| c.asked && !c.reachable));
+    assert!(plan.candidates.iter().all(|c| c.reason == "out of reach by 3 mm"));
+    let (all, done) = (plan.candidates.len(), plan.done.unwrap());
+    assert_eq!((done.cause, done.refused(), done.not_worth_it), (Cause::Refused, all, 0));
+    let text = format!(
+        "of {all} that would show something new: the robot refuses {all} ({all} out of reach)"
+    );
+    assert!(done.text.ends_with(&text), "{}", done.text);
+    // It takes all, but from where nothing new is seen.
+    let away = looking_along(&(Vec3::x() * 2.0), &Vec3::x());
+    let nothing = Ok(ReachedView { pose: away, duration: 1.0 });
+    let done = next_view(&space, &mut |_| nothing.clone()).done.unwrap();
+    assert_eq!((done.cause, done.refused(), done.not_worth_it), (Cause::NotWorthIt, 0, all));
+    assert!(!done.text.contains("refuses") && done.text.contains("would show less than"));
+    // Both, and for two reasons.
+    let mut asked = 0;
+    let mut mixed = |_: &Pose| {
+        asked += 1;
+        match asked {
+            1 => no("in collision"),
+            2 | 3 => no("out of reach"),
+            _ => nothing.clone(),
+        }
+    };
+    let done = next_view(&space, &mut mixed).done.unwrap();
+    assert_eq!((done.cause, done.not_worth_it), (Cause::Refused, all - 3));
+    assert_eq!(done.refusals, [("out of reach", 2), ("in collision", 1)]);
+    let text = format!("refuses 3 (2 out of reach, 1 in collision), {} would show less", all - 3);
+    assert!(done.text.contains(&text), "{}", done.text);
+    // Nothing is worth asking for.
+    let params = ViewParams { min_gain: 1.0, weight_inside: 0.0, ..ViewParams::default() };
+    space.params = ViewParams { voxel_edge: 0.005, ..params };
+    let done = next_view(&space, &mut |pose| any(pose)).done.unwrap();
+    assert_eq!((done.cause, done.refused(), done.not_worth_it), (Cause::NotWorthIt, 0, 0));
+}
+
+#[test]
+fn hidden_space_counts_only_near_surface_unless_all_is_asked_for() {
+    let hidden = |hidden_reach: usize| {
+        let mut space = space(&ViewParams { hidden_reach, ..ViewParams::default() });
+        space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+        let side = looking_along(&(Vec3::x() * 0.65), &-Vec3::x());
+        let judge = measure::Judge::new(&space);
+        let gain = judge.gain(&side, &mut judge.set());
+        (gain.hidden, gain.overlap, gain.worth)
+    };
+    let (near, far, all) = (hidden(3), hidden(6), hidden(0));
+    // The plate is 13 voxels wide and stands 20 voxels above the end of its shadow.
+    assert!((13 * 13 * 2..17 * 17 * 4).contains(&near.0), "{near:?}");
+    assert!((13 * 13 * 5..19 * 19 * 7).contains(&far.0), "{far:?}");
+    assert!(all.0 > 13 * 13 * 18, "{all:?}");
+    // Rays that meet nothing but shadow are no rays into the object: they do not make the overlap small.
+    assert!(near.1 > 2.0 * all.1, "{near:?} {all:?}");
+    // What is unknown does not decide.
+    assert_eq!(near.2, 0.5 * near.0 as f64);
+}
+
+#[test]
+fn surface_seen_from_behind_or_at_a_grazing_angle_is_no_overlap() {
+    let mut space = space(&ViewParams::default());
+    space.integrate(&plate(0.03, 0.002), &above()).unwrap();
+    let judge = measure::Judge::new(&space);
+    let overlap = |direction: &Vec3| {
+        let pose = looking_along(&(direction.normalize() * -0.65), &direction.normalize());
+        judge.gain(&pose, &mut judge.set()).overlap
+    };
+    let [front, slanted, grazing, back] = [[0.0, -1.0], [1.0, -1.0], [1.0, -0.1], [0.2, 1.0]]
+        .map(|[x, z]| overlap(&Vec3::new(x, 0.0, z)));
+    assert!(front > 0.6 && slanted > 0.4, "{front} {slanted}");
+    assert!(grazing < 0.1 && back == 0.0, "{grazing} {back}");
+}
+
+#[test]
+fn voxels_beside_those_that_have_their_points_count_less_and_all_count_in_the_coverage() {
+    let mut params = ViewParams { weight_inside: 0.0, ..ViewParams::default() };
+    let worth = |params: &ViewParams, scan: &Scan| {
+        let mut space = space(params);
+        space.integrate(scan, &above()).unwrap();
+        let judge = measure::Judge::new(&space);
+        (judge.gain(&above(), &mut judge.set()), space.counts())
+    };
+    // A plate whose last row of voxels lies under its edge.
+    let (gain, counts) = worth(&params, &plate(0.0305, 0.002));
+    assert!(gain.lacking == 0 || gain.beside == gain.lacking, "{gain:?}");
+    // A few points beside it, and as many on their own.
+    let mut scan = plate(0.03, 0.002);
+    for i in 1..4_u8 {
+        scan.points.push([0.032, 1e-3 * f32::from(i), 0.648]);
+        scan.points.push([0.062, 1e-3 * f32::from(i), 0.648]);
+    }
+    let (gain, both) = worth(&params, &scan);
+    assert_eq!((gain.lacking, gain.beside), (2, 1));
+    assert_eq!(gain.worth, 1.0 + params.beside_share);
+    assert_eq!(both.occupied - both.satisfied, 2);
+    assert_eq!((both.occupied - both.covered, counts.occupied - counts.covered), (1, 0));
+    assert!(both.frontier > 0 && both.coverage() < both.covered as f64 / both.occupied as f64);
+    params.beside_share = 1.0;
+    assert_eq!(worth(&params, &scan).0.worth, 2.0);
 }
 
 #[test]

@@ -33,11 +33,14 @@ impl Store {
         self.scans.len()
     }
 
-    /// Takes a scan, or a newer version of one.
+    /// Takes a scan, or a newer version of one; an older one that comes late is passed over.
     ///
     /// # Errors
     /// What of the message does not fit, in words.
     pub(crate) fn take(&mut self, message: &RegisteredScan) -> Result<(), String> {
+        if self.scans.get(&message.id).is_some_and(|held| held.version > message.version) {
+            return Ok(());
+        }
         let scan = scan_from_message(&message.cloud)?;
         let held = Held {
             // One without enough points was refused already.
@@ -117,5 +120,27 @@ impl Store {
             )));
         }
         filter(&accepted, self.residual.unwrap_or(f64::NAN), params, &Progress::silent())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use puffer_core::geometry::Scan;
+    use puffer_msgs::std_msgs::msg::Header;
+    use puffer_shell::convert::scan_message;
+
+    #[test]
+    fn an_older_version_of_a_scan_that_comes_late_is_passed_over() {
+        let mut store = Store::default();
+        let scan = |version: u32, status: u8| {
+            let cloud = scan_message(&Scan::default(), Header::default());
+            RegisteredScan { version, status, cloud, ..RegisteredScan::default() }
+        };
+        store.take(&scan(2, RegisteredScan::ACCEPTED)).unwrap();
+        store.take(&scan(1, RegisteredScan::DEFERRED)).unwrap();
+        assert_eq!((store.scans[&0].version, store.scans[&0].status), (2, Status::Accepted));
+        store.take(&scan(3, RegisteredScan::REFUSED)).unwrap();
+        assert_eq!((store.len(), store.scans[&0].status), (1, Status::Refused));
     }
 }

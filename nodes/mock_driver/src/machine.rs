@@ -101,6 +101,8 @@ impl Machine {
         };
         let view = tokio::task::block_in_place(|| self.cell.scan(&middle))?;
         let count = view.scan.returns().count();
+        // Whoever was too busy to hear all transforms of the motion gets that of the scan: no pose depends on the load.
+        self.outputs.pose(self.cell.robot(), &middle, stamp)?;
         self.points.publish_message(&message(&view.scan, stamp)).await?;
         Ok(count)
     }

@@ -33,6 +33,11 @@ impl Outputs {
         self.tf.send_static(&transforms(robot, &[], Stamp::ZERO, false))
     }
 
+    /// Publishes once more where the links were that joints move.
+    pub(crate) fn pose(&self, robot: &RobotModel, q: &[f64], stamp: Stamp) -> Result<()> {
+        self.tf.send(&transforms(robot, q, stamp, true))
+    }
+
     /// Publishes time and joint positions, and the links that joints move.
     pub(crate) fn tick(&self, robot: &RobotModel, q: &[f64], stamp: Stamp) -> Result<()> {
         let (sec, nanosec) = stamp.parts();

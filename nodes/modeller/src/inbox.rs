@@ -23,8 +23,12 @@ struct Held {
 }
 
 impl Inbox {
+    /// Takes a scan, or a newer version of one; an older one that comes late is passed over.
     pub(crate) fn put(&self, scan: RegisteredScan) {
         let mut held = self.lock();
+        if held.scans.get(&scan.id).is_some_and(|known| known.version > scan.version) {
+            return;
+        }
         held.new.retain(|id| *id != scan.id);
         held.new.push(scan.id);
         held.scans.insert(scan.id, scan);
@@ -65,6 +69,38 @@ impl Inbox {
             }
             came.await;
         }
+    }
+
+    /// Waits until each of these scans has come in this version or a newer one; those that are missing after `deadline`.
+    pub(crate) async fn wait_for_versions(
+        &self,
+        wanted: &[(u32, u32)],
+        deadline: Duration,
+    ) -> Result<()> {
+        let all_came = async {
+            loop {
+                let came = self.came.notified();
+                if self.missing(wanted).is_empty() {
+                    return;
+                }
+                came.await;
+            }
+        };
+        tokio::time::timeout(deadline, all_came).await.map_err(|_| {
+            anyhow!(
+                "registered_scan with ids {:?} did not come anew within {:.0} s",
+                self.missing(wanted),
+                deadline.as_secs_f64()
+            )
+        })
+    }
+
+    fn missing(&self, wanted: &[(u32, u32)]) -> Vec<u32> {
+        let held = self.lock();
+        let late = |(id, version): &&(u32, u32)| {
+            held.scans.get(id).is_none_or(|scan| scan.version < *version)
+        };
+        wanted.iter().filter(late).map(|(id, _)| *id).collect()
     }
 
     /// The scans that are new since the last call.
@@ -108,5 +144,29 @@ mod tests {
         assert_eq!(inbox.wait_for(0, Duration::ZERO).await.unwrap().id, 0);
         let error = inbox.wait_for(2, Duration::from_millis(1)).await.unwrap_err().to_string();
         assert!(error.contains("id 2"), "{error}");
+    }
+
+    #[tokio::test]
+    async fn an_older_version_that_comes_late_is_passed_over_and_newer_ones_are_awaited() {
+        let inbox = Arc::new(Inbox::default());
+        let put = |version: u32, status: u8| {
+            inbox.put(RegisteredScan { id: 0, version, status, ..RegisteredScan::default() });
+        };
+        put(3, RegisteredScan::ACCEPTED);
+        assert_eq!(inbox.take_new().len(), 1);
+        put(2, RegisteredScan::DEFERRED);
+        assert_eq!(inbox.take_new().len(), 0);
+        let held = inbox.wait_for(0, Duration::ZERO).await.unwrap();
+        assert_eq!((held.version, held.status), (3, RegisteredScan::ACCEPTED));
+        inbox.wait_for_versions(&[(0, 3)], Duration::ZERO).await.unwrap();
+        let missing = inbox.wait_for_versions(&[(0, 4)], Duration::from_millis(1)).await;
+        assert!(missing.unwrap_err().to_string().contains("[0]"));
+        let waiting = tokio::spawn({
+            let inbox = Arc::clone(&inbox);
+            async move { inbox.wait_for_versions(&[(0, 4)], Duration::from_secs(60)).await }
+        });
+        tokio::task::yield_now().await;
+        put(4, RegisteredScan::ACCEPTED);
+        waiting.await.unwrap().unwrap();
     }
 }

@@ -3,7 +3,9 @@
 use crate::Params;
 use anyhow::{Context, Result};
 use puffer_core::geometry::{Pose, pose_to_rows};
+use puffer_core::params::ParamValue;
 use puffer_core::scans::{ScanFolder, ScanSet, View};
+use puffer_core::view::Cause;
 use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::srv::PlanViewResponse;
 use puffer_shell::Stamp;
@@ -73,10 +75,19 @@ impl Journal {
                 })
             })
             .collect();
+        let refusals: Map<String, Value> = plan
+            .refusals
+            .iter()
+            .cloned()
+            .zip(plan.refusal_counts.iter().map(|count| json!(count)))
+            .collect();
         let mut view = Map::new();
         for (key, value) in [
             ("view", rows(&plan.view)),
             ("done", json!(plan.done)),
+            ("done_cause", cause(plan.done_cause)),
+            ("not_worth_it", json!(plan.not_worth_it)),
+            ("refusals", json!(refusals)),
             ("message", json!(plan.message)),
             ("expected_gain", json!(plan.expected_gain)),
             ("coverage", json!(plan.coverage)),
@@ -155,6 +166,18 @@ impl Journal {
             .and_then(|()| std::fs::rename(&part, &path))
             .with_context(|| format!("cannot write {}", path.display()))
     }
+}
+
+/// The word for why no view is left; null if one is.
+fn cause(code: u8) -> Value {
+    let cause = match code {
+        PlanViewResponse::NO_FIRST_VIEW => Cause::NoFirstView,
+        PlanViewResponse::NOTHING_ASKS => Cause::NothingAsks,
+        PlanViewResponse::NOT_WORTH_IT => Cause::NotWorthIt,
+        PlanViewResponse::REFUSED => Cause::Refused,
+        _ => return Value::Null,
+    };
+    cause.to_value()
 }
 
 fn verdict(message: &RegisteredScan) -> Value {

@@ -8,6 +8,8 @@ use anyhow::{Result, anyhow};
 use puffer_core::session::{Command, Event, Outcome, Phase, SessionParams, State, step};
 use puffer_core::verdict::{ModelVerdict, ScanCount};
 use puffer_msgs::action::{ModelObjectGoal, ReconstructMeshGoal, ReconstructMeshResult};
+use puffer_msgs::msg::RegisteredScan;
+use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::PlanViewRequest;
 use puffer_msgs::trajectory_msgs::msg::JointTrajectory;
 use puffer_shell::convert::status_from_message;
@@ -25,10 +27,13 @@ pub(crate) struct Runner<'a> {
     /// The way to the planned view.
     trajectory: JointTrajectory,
     goal: ModelObjectGoal,
+    /// Where the robot was sent to last; no joints if it did not get there.
+    sent_to: JointState,
+    /// Numbers and versions of the accepted scans.
+    accepted: Vec<(u32, u32)>,
     revision: u32,
-    /// Scans that came before the poses were refined, and those of them that were accepted then.
+    /// Scans that came before the poses were refined.
     scans: usize,
-    accepted: usize,
     cloud_hash: String,
     /// What was said of the mesh: of the last one that was written, if there is one.
     pub mesh: ReconstructMeshResult,
@@ -55,9 +60,10 @@ impl<'a> Runner<'a> {
             journal,
             trajectory: JointTrajectory::default(),
             goal,
+            sent_to: JointState::default(),
+            accepted: Vec::new(),
             revision: 0,
             scans: 0,
-            accepted: 0,
             cloud_hash: String::new(),
             mesh: ReconstructMeshResult::default(),
         }
@@ -160,6 +166,10 @@ impl<'a> Runner<'a> {
             revision: self.revision,
             point_factor: factor as u32,
             roi: self.goal.roi,
+            scans_listed: true,
+            accepted: self.accepted.iter().map(|(id, _)| *id).collect(),
+            accepted_versions: self.accepted.iter().map(|(_, version)| *version).collect(),
+            sent_to: self.sent_to.clone(),
             ..PlanViewRequest::default()
         };
         let plan = self.partners.plan(&request).await?;
@@ -174,7 +184,12 @@ impl<'a> Runner<'a> {
     }
 
     async fn drive(&mut self, stop: &Stop) -> Result<Event> {
+        self.sent_to = JointState::default();
         self.partners.drive(&self.trajectory, stop).await?;
+        if let Some(end) = self.trajectory.points.last() {
+            self.sent_to.name = self.trajectory.joint_names.clone();
+            self.sent_to.position = end.positions.clone();
+        }
         Ok(Event::Moved)
     }
 
@@ -182,6 +197,7 @@ impl<'a> Runner<'a> {
         let deadline = Duration::from_secs_f64(self.node.params().modeller.register_deadline);
         let first = self.inbox.wait_for(index as u32, deadline).await?;
         let status = status_from_message(first.status).map_err(anyhow::Error::msg)?;
+        self.accepted = first.accepted.into_iter().zip(first.accepted_versions).collect();
         self.keep()?;
         self.journal.write(self.node.now(), &Map::new())?;
         Ok(Event::Registered(status))
@@ -198,7 +214,16 @@ impl<'a> Runner<'a> {
     async fn refine(&mut self, scans: usize, stop: &Stop) -> Result<Event> {
         let refined = self.partners.refine(scans, stop).await?;
         self.revision = refined.revision;
-        (self.scans, self.accepted) = (scans, refined.accepted as usize);
+        self.scans = scans;
+        let told: Vec<(u32, u32)> = refined.ids.into_iter().zip(refined.versions).collect();
+        let accepted = |status: &u8| *status == RegisteredScan::ACCEPTED;
+        let verdicts = told.iter().zip(&refined.status);
+        self.accepted = verdicts.filter(|(_, s)| accepted(s)).map(|(scan, _)| *scan).collect();
+        let deadline = Duration::from_secs_f64(self.node.params().modeller.register_deadline);
+        if let Err(error) = self.inbox.wait_for_versions(&told, deadline).await {
+            // The mesh does not need them here: the filter has its own.
+            tracing::warn!("the run folder holds older points: {error}");
+        }
         Ok(Event::Finished)
     }
 
@@ -213,7 +238,7 @@ impl<'a> Runner<'a> {
             cloud_hash: self.cloud_hash.clone(),
             roi: self.goal.roi,
             scans: self.scans as u32,
-            accepted: self.accepted as u32,
+            accepted: self.accepted.len() as u32,
             force: self.goal.force,
             ..ReconstructMeshGoal::default()
         };

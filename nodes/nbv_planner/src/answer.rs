@@ -2,7 +2,7 @@
 
 use crate::desk::Answer;
 use puffer_core::robot::Trajectory;
-use puffer_core::view::Candidate;
+use puffer_core::view::{Candidate, Cause, Ending};
 use puffer_msgs::builtin_interfaces::msg::Duration;
 use puffer_msgs::msg;
 use puffer_msgs::srv::PlanViewResponse;
@@ -38,10 +38,25 @@ pub(crate) fn response(answer: &Answer, joints: &[String]) -> PlanViewResponse {
         }
         _ => {
             response.done = true;
-            response.message = plan.done.clone().unwrap_or_else(|| "no view is left".to_owned());
+            if let Some(ending) = &plan.done {
+                tell_ending(ending, &mut response);
+            }
         }
     }
     response
+}
+
+fn tell_ending(ending: &Ending, response: &mut PlanViewResponse) {
+    response.message = ending.text.clone();
+    response.done_cause = match ending.cause {
+        Cause::NoFirstView => PlanViewResponse::NO_FIRST_VIEW,
+        Cause::NothingAsks => PlanViewResponse::NOTHING_ASKS,
+        Cause::NotWorthIt => PlanViewResponse::NOT_WORTH_IT,
+        Cause::Refused => PlanViewResponse::REFUSED,
+    };
+    response.not_worth_it = ending.not_worth_it as u32;
+    response.refusals = ending.refusals.iter().map(|(kind, _)| (*kind).to_owned()).collect();
+    response.refusal_counts = ending.refusals.iter().map(|(_, count)| *count as u32).collect();
 }
 
 fn candidate(candidate: &Candidate) -> msg::Candidate {

@@ -10,7 +10,7 @@ use puffer_core::robot::{
     slide_range,
 };
 use puffer_core::scans::Support;
-use puffer_core::view::{Plan, ReachedView, State, ViewParams, ViewSpace, next_view};
+use puffer_core::view::{Plan, ReachedView, RefusedView, State, ViewParams, ViewSpace, next_view};
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::PlanViewRequest;
@@ -22,6 +22,10 @@ use std::collections::BTreeMap;
 /// Before anything was seen, the object is taken to fill a ball of this share of the working distance.
 const UNSEEN_SHARE: f64 = 0.4;
 
+/// A joint this near to where it was sent to, radians or metres, is there: finer than what controllers take for reached,
+/// coarser than encoders.
+const AT_REST: f64 = 0.01;
+
 /// The planner's state.
 pub(crate) struct Desk {
     params: Params,
@@ -32,13 +36,22 @@ pub(crate) struct Desk {
     /// What is wrong with the newest description.
     fault: Option<String>,
     joints: Option<Vec<f64>>,
-    /// Whether the space must be made anew because poses have changed.
+    /// The bodies that hold the object.
+    holding: Option<Vec<Body>>,
+    /// Whether the space must be made anew, from what is known now.
     stale: bool,
+    /// Numbers and versions of the scans that the space was made of, in the order in which it took them.
+    made_of: Vec<(u32, u32)>,
+    /// The views planned so far.
+    planned: Vec<Pose>,
     /// That of the newest corrected poses, 0 without.
     revision: u32,
     /// What the space was made for.
     aim: Aim,
 }
+
+/// A body and its pose `shape_from_object`.
+type Body = (Shape, Pose);
 
 /// What views are planned for.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +63,11 @@ pub(crate) struct Aim {
 }
 
 struct Held {
+    version: u32,
     scan: Scan,
     beyond: Scan,
+    /// What the robot said.
+    prior: Pose,
     pose: Pose,
     status: Status,
 }
@@ -67,7 +83,7 @@ pub(crate) struct Answer {
 impl Desk {
     pub(crate) fn new(params: Params) -> Result<Desk> {
         let aim = Aim { region: params.planner.region(), factor: 1 };
-        let space = empty_space(&params, &aim, None)?;
+        let space = empty_space(&params, &aim, &[])?;
         Ok(Desk {
             params,
             space,
@@ -76,7 +92,10 @@ impl Desk {
             description: String::new(),
             fault: None,
             joints: None,
+            holding: None,
             stale: false,
+            made_of: Vec::new(),
+            planned: Vec::new(),
             revision: 0,
             aim,
         })
@@ -108,19 +127,32 @@ impl Desk {
         Ok(Aim { region, factor: request.point_factor.max(1) as usize })
     }
 
-    /// What is missing for a plan with `scans` scans and their poses of this revision, in words.
-    pub(crate) fn missing(&self, scans: usize, revision: u32) -> Option<String> {
+    /// What is missing of the robot, in words.
+    pub(crate) fn missing_robot(&self) -> Option<String> {
         if self.robot.is_none() {
             Some("no robot_description came: start the driver or robot_state_publisher".to_owned())
-        } else if self.joints.is_none() {
-            Some("no joint_states for all joints of the robot came".to_owned())
-        } else if self.scans.len() < scans {
-            Some(format!("{} of {scans} scans came", self.scans.len()))
         } else {
-            (self.revision < revision).then(|| {
-                format!("corrected poses of revision {} of {revision} came", self.revision)
-            })
+            let nowhere = self.joints.is_none();
+            nowhere.then(|| "no joint_states for all joints of the robot came".to_owned())
         }
+    }
+
+    /// What is missing of the scans that a request names, in words.
+    pub(crate) fn missing_scans(&self, request: &PlanViewRequest) -> Option<String> {
+        let (scans, revision) = (request.scans as usize, request.revision);
+        if self.scans.len() < scans {
+            return Some(format!("{} of {scans} scans came", self.scans.len()));
+        }
+        if self.revision < revision {
+            return Some(format!(
+                "corrected poses of revision {} of {revision} came",
+                self.revision
+            ));
+        }
+        let versions = request.accepted.iter().zip(&request.accepted_versions);
+        let mut late = versions
+            .filter(|(id, version)| self.scans.get(id).is_none_or(|held| held.version < **version));
+        late.next().map(|(id, version)| format!("scan {id} did not come in its version {version}"))
     }
 
     /// Takes the robot's description; the same one again changes nothing.
@@ -130,7 +162,7 @@ impl Desk {
         }
         // Planning goes on with the newest description or none.
         self.description = urdf.to_owned();
-        (self.robot, self.joints, self.stale) = (None, None, true);
+        (self.robot, self.joints, self.holding, self.stale) = (None, None, None, true);
         let workcell = RobotModel::from_urdf(urdf).and_then(Workcell::new);
         let workcell = workcell.context("robot_description");
         self.fault = workcell.as_ref().err().map(|error| format!("{error:#}"));
@@ -152,33 +184,50 @@ impl Desk {
         }
     }
 
-    /// Takes a registered scan, or a newer version of one.
+    /// Whether the robot stands where it was sent to, as far as joint_states say.
+    pub(crate) fn stands_at(&self, sent_to: &JointState) -> bool {
+        let there = self.robot.as_ref().and_then(|w| joint_vector(w.robot(), sent_to));
+        there.zip(self.joints.as_ref()).is_some_and(|(there, joints)| {
+            there.iter().zip(joints).all(|(a, b)| (a - b).abs() <= AT_REST)
+        })
+    }
+
+    /// Takes a registered scan, or a newer version of one; an older one that comes late is passed over.
     pub(crate) fn take(&mut self, message: &RegisteredScan) -> Result<()> {
+        if self.scans.get(&message.id).is_some_and(|held| held.version > message.version) {
+            return Ok(());
+        }
         let held = Held {
+            version: message.version,
             scan: scan_from_message(&message.cloud).map_err(anyhow::Error::msg)?,
             beyond: scan_from_message(&message.beyond).map_err(anyhow::Error::msg)?,
+            prior: pose_from_message(&message.prior).map_err(anyhow::Error::msg)?,
             pose: pose_from_message(&message.object_from_sensor.pose)
                 .map_err(anyhow::Error::msg)?,
             status: status_from_message(message.status).map_err(anyhow::Error::msg)?,
         };
-        if held.status == Status::Accepted && !self.scans.contains_key(&message.id) && !self.stale {
-            self.space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
-        } else if held.status == Status::Accepted {
-            self.stale = true;
-        } else {
-            // It shows nothing that can be trusted, but it need not be tried again.
-            self.space.mark_used(&held.pose);
-        }
+        let accepted = held.status == Status::Accepted;
         self.scans.insert(message.id, held);
+        // The next one is taken in at once, so that a plan need not wait for it; whether it is what the plan is to
+        // rest on is seen then.
+        let next = self.made_of.last().is_none_or(|(last, _)| *last < message.id);
+        if accepted && next && !self.stale { self.integrate(message.id) } else { Ok(()) }
+    }
+
+    /// Takes scan `id` into the space.
+    fn integrate(&mut self, id: u32) -> Result<()> {
+        let Some(held) = self.scans.get(&id) else { return Ok(()) };
+        self.space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
+        self.made_of.push((id, held.version));
         Ok(())
     }
 
     /// Takes corrected poses.
     pub(crate) fn correct(&mut self, message: &RegisteredPoses) -> Result<()> {
-        for ((id, pose), status) in
-            message.ids.iter().zip(&message.object_from_sensor).zip(&message.status)
-        {
-            if let Some(held) = self.scans.get_mut(id) {
+        let poses = message.ids.iter().zip(&message.object_from_sensor).zip(&message.status);
+        for (((id, pose), status), version) in poses.zip(&message.versions) {
+            // What was told of a scan later than the poses holds.
+            if let Some(held) = self.scans.get_mut(id).filter(|held| held.version <= *version) {
                 held.pose = pose_from_message(&pose.pose).map_err(anyhow::Error::msg)?;
                 held.status = status_from_message(*status).map_err(anyhow::Error::msg)?;
             }
@@ -188,25 +237,22 @@ impl Desk {
         Ok(())
     }
 
-    /// Plans the next view from the joint positions `start`, or from where the robot stands.
-    pub(crate) fn plan(&mut self, start: &JointState, aim: Aim) -> Result<Answer> {
+    /// Plans the next view. It depends on what the request names, not on what else has come, or when.
+    pub(crate) fn plan(&mut self, request: &PlanViewRequest) -> Result<Answer> {
+        let aim = self.aim(request)?;
         self.aim_at(aim);
-        self.refresh()?;
+        self.refresh(&self.members(request))?;
         let workcell = self.robot.as_ref().ok_or_else(|| anyhow!("no robot"))?;
-        let start = if start.name.is_empty() {
-            self.joints.clone().ok_or_else(|| anyhow!("no joint states"))?
-        } else {
-            joint_vector(workcell.robot(), start)
-                .ok_or_else(|| anyhow!("start does not name all joints of the robot"))?
-        };
+        let start = self.start(workcell.robot(), request)?;
         let sensor = self.params.planner.sensor();
         let obstacle = obstacle(&self.space, &self.params);
         let mut found: Vec<Reached> = Vec::new();
         let on_table = self.params.planner.support == Support::Table;
-        let mut reach = |view: &Pose| -> std::result::Result<ReachedView, String> {
+        let mut reach = |view: &Pose| -> std::result::Result<ReachedView, RefusedView> {
             if on_table && view.translation.z <= 0.0 {
                 // It reaches farther than the region of interest, where the space could say so.
-                return Err("the table hides the object from below".to_owned());
+                let reason = "the table hides the object from below".to_owned();
+                return Err(RefusedView { kind: "from below the table", reason });
             }
             let request = ReachRequest {
                 view: *view,
@@ -216,7 +262,11 @@ impl Desk {
                 obstacle: &obstacle,
                 margin: self.params.planner.margin,
             };
-            match workcell.reach(&request).map_err(|error| error.to_string())? {
+            let asked = workcell.reach(&request).map_err(|error| RefusedView {
+                kind: "that the robot cannot be asked for",
+                reason: error.to_string(),
+            });
+            match asked? {
                 Reach::Reached(reached) => {
                     let view = ReachedView {
                         pose: reached.object_from_sensor,
@@ -225,17 +275,17 @@ impl Desk {
                     found.push(*reached);
                     Ok(view)
                 }
-                Reach::Refused { reason } => Err(reason),
+                Reach::Refused { hindrance, reason } => {
+                    Err(RefusedView { kind: hindrance.words(), reason })
+                }
             }
         };
         let plan = next_view(&self.space, &mut reach);
         let reached = plan.chosen.as_ref().and_then(|chosen| {
             found.into_iter().find(|reached| reached.object_from_sensor == chosen.pose)
         });
-        if let Some(chosen) = &plan.chosen {
-            // Whatever becomes of it, it is not planned twice.
-            self.space.mark_used(&chosen.pose);
-        }
+        // Whatever becomes of it, it is not planned twice.
+        self.planned.extend(plan.chosen.as_ref().map(|chosen| chosen.pose));
         Ok(Answer { plan, reached, voxel_edge: self.space.edge() })
     }
 
@@ -244,21 +294,59 @@ impl Desk {
         self.aim = aim;
     }
 
-    /// Makes the space anew if poses or the robot have changed.
-    fn refresh(&mut self) -> Result<()> {
-        if !self.stale {
-            return Ok(());
+    /// The scans that a plan rests on, ascending: those that the request lists, or all that were accepted.
+    fn members(&self, request: &PlanViewRequest) -> Vec<u32> {
+        if request.scans_listed {
+            return request.accepted.clone();
         }
-        let robot = self.robot.as_ref().zip(self.joints.as_deref());
-        let mut space = empty_space(&self.params, &self.aim, robot)?;
-        for held in self.scans.values() {
-            if held.status == Status::Accepted {
-                space.integrate_with(&held.scan, &held.beyond, &held.pose)?;
-            } else {
-                space.mark_used(&held.pose);
-            }
+        let accepted = self.scans.iter().filter(|(_, held)| held.status == Status::Accepted);
+        accepted.map(|(id, _)| *id).collect()
+    }
+
+    /// Where the way starts.
+    fn start(&self, robot: &RobotModel, request: &PlanViewRequest) -> Result<Vec<f64>> {
+        if !request.start.name.is_empty() {
+            return joint_vector(robot, &request.start)
+                .ok_or_else(|| anyhow!("start does not name all joints of the robot"));
         }
-        self.space = space;
+        // Joint states come when they come; where it was sent to is the same in each run.
+        let sent_to = joint_vector(robot, &request.sent_to);
+        sent_to
+            .filter(|_| self.stands_at(&request.sent_to))
+            .or_else(|| self.joints.clone())
+            .ok_or_else(|| anyhow!("no joint states"))
+    }
+
+    /// Brings the space to what the scans `members` show, and no others. Scans are taken in by ascending numbers, in
+    /// whatever order they came and were accepted.
+    fn refresh(&mut self, members: &[u32]) -> Result<()> {
+        let version = |id: &u32| Some((*id, self.scans.get(id)?.version));
+        let wanted: Vec<(u32, u32)> = members.iter().filter_map(version).collect();
+        if self.stale || !wanted.starts_with(&self.made_of) {
+            self.clear()?;
+        }
+        for (id, _) in &wanted[self.made_of.len()..] {
+            self.integrate(*id)?;
+        }
+        // Scans that were not accepted show nothing that can be trusted, but need not be tried again.
+        self.space.forget_marks();
+        let others = self.scans.values().filter(|held| held.status != Status::Accepted);
+        for pose in others.map(|held| &held.prior).chain(&self.planned) {
+            self.space.mark_used(pose);
+        }
+        Ok(())
+    }
+
+    /// A space in which nothing was seen yet.
+    fn clear(&mut self) -> Result<()> {
+        if self.holding.is_none()
+            && let Some((workcell, joints)) = self.robot.as_ref().zip(self.joints.as_deref())
+        {
+            self.holding = Some(bodies_round_object(workcell.robot(), joints)?);
+        }
+        let holding = self.holding.as_deref().unwrap_or_default();
+        self.space = empty_space(&self.params, &self.aim, holding)?;
+        self.made_of.clear();
         self.stale = false;
         Ok(())
     }
@@ -266,19 +354,17 @@ impl Desk {
     /// Forgets all scans.
     pub(crate) fn reset(&mut self) -> Result<()> {
         self.scans.clear();
+        self.planned.clear();
         self.revision = 0;
         self.aim = Aim { region: self.params.planner.region(), factor: 1 };
-        self.stale = true;
-        self.refresh()
+        // The next object may be held otherwise.
+        self.holding = None;
+        self.clear()
     }
 }
 
 /// A space in which nothing was seen; what holds the object is set apart.
-fn empty_space(
-    params: &Params,
-    aim: &Aim,
-    robot: Option<(&Workcell, &[f64])>,
-) -> Result<ViewSpace> {
+fn empty_space(params: &Params, aim: &Aim, holding: &[Body]) -> Result<ViewSpace> {
     let planner = &params.planner;
     let min_points = params.view.min_points.saturating_mul(aim.factor);
     let view = ViewParams { min_points, ..params.view.clone() };
@@ -286,10 +372,9 @@ fn empty_space(
     if planner.support == Support::Table {
         space.exclude_below(0.0);
     }
-    if let Some((workcell, joints)) = robot {
-        let bodies = bodies_round_object(workcell.robot(), joints)?;
+    if !holding.is_empty() {
         space.exclude_where(|point| {
-            bodies.iter().any(|(shape, shape_from_object)| {
+            holding.iter().any(|(shape, shape_from_object)| {
                 shape.distance(&(shape_from_object * Point3::from(*point)).coords) <= 0.0
             })
         });
@@ -298,7 +383,7 @@ fn empty_space(
 }
 
 /// The bodies that hold the object while the robot stands at `joints`, each with the pose `shape_from_object`.
-fn bodies_round_object(robot: &RobotModel, joints: &[f64]) -> Result<Vec<(Shape, Pose)>> {
+fn bodies_round_object(robot: &RobotModel, joints: &[f64]) -> Result<Vec<Body>> {
     let object = robot.link(OBJECT_FRAME)?;
     let holding = robot.holding(object, robot.link(SENSOR_FRAME)?);
     let poses = robot.forward(joints);
@@ -339,32 +424,5 @@ fn obstacle(space: &ViewSpace, params: &Params) -> Obstacle {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use puffer_core::geometry::Vec3;
-    use puffer_msgs::geometry_msgs::msg::Vector3;
-
-    #[test]
-    fn a_request_bounds_what_views_are_planned_for() {
-        let mut desk = Desk::new(Params::default()).unwrap();
-        let configured = desk.params.planner.region();
-        assert_eq!(*desk.space().roi(), configured);
-        let roi = Vector3 { x: 0.1, y: 0.2, z: 0.15 };
-        let request = PlanViewRequest { roi, point_factor: 4, ..PlanViewRequest::default() };
-        let aim = desk.aim(&request).unwrap();
-        assert_eq!(aim.factor, 4);
-        desk.aim_at(aim);
-        desk.refresh().unwrap();
-        let region = *desk.space().roi();
-        assert_eq!(region.min, Vec3::new(-0.05, -0.1, configured.min.z));
-        assert_eq!(region.max, Vec3::new(0.05, 0.1, 0.15));
-        assert!(desk.space().state_at(&Vec3::new(0.06, 0.0, 0.1)).is_none());
-
-        let aim = desk.aim(&PlanViewRequest::default()).unwrap();
-        assert_eq!(aim, Aim { region: configured, factor: 1 });
-        let roi = Vector3 { x: -0.1, y: 0.2, z: 0.15 };
-        let error = desk.aim(&PlanViewRequest { roi, ..PlanViewRequest::default() }).unwrap_err();
-        assert!(error.to_string().contains("roi"), "{error}");
-        assert!(desk.missing(0, 0).is_some(), "the robot is missing");
-    }
-}
+#[path = "desk_tests.rs"]
+mod tests;

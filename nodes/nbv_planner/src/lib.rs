@@ -24,6 +24,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::Mutex;
 
+/// How often it is looked whether all is there that a plan needs.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// How long a plan waits for joint states that say that the robot stands where it was sent to: they follow the end of a
+/// motion within a period of the controller.
+const REST_DEADLINE: Duration = Duration::from_secs(2);
+
 /// Runs the planner until `stop`.
 ///
 /// # Errors
@@ -80,12 +86,10 @@ fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>, markers: &Arc<Marke
             if let Err(response) = wait_for(&desk, &request, deadline).await {
                 return *response;
             }
+            wait_for_rest(&desk, &request.sent_to).await;
             let mut desk = desk.lock().await;
             let since = Instant::now();
-            let planned = desk
-                .aim(&request)
-                .and_then(|aim| tokio::task::block_in_place(|| desk.plan(&request.start, aim)));
-            match planned {
+            match tokio::task::block_in_place(|| desk.plan(&request)) {
                 Ok(planned) => {
                     markers.show_space(desk.space(), node.now());
                     markers.show_plan(&planned.plan, node.now());
@@ -114,26 +118,38 @@ async fn wait_for(
     deadline: Duration,
 ) -> std::result::Result<(), Box<PlanViewResponse>> {
     let since = Instant::now();
-    let scans = request.scans as usize;
     loop {
-        let (fault, missing, without_poses, there) = {
+        let (fault, no_robot, no_scans) = {
             let desk = desk.lock().await;
-            let missing = desk.missing(scans, request.revision);
-            (desk.fault(), missing, desk.missing(scans, 0), desk.scans())
+            (desk.fault(), desk.missing_robot(), desk.missing_scans(request))
         };
         if let Some(fault) = fault {
             return Err(Box::new(failed(PlanViewResponse::NO_ROBOT, fault)));
         }
-        let Some(missing) = missing else { return Ok(()) };
+        let (code, missing) = match (no_robot, no_scans) {
+            (None, None) => return Ok(()),
+            (_, Some(missing)) => (PlanViewResponse::SCANS_MISSING, missing),
+            (Some(missing), None) => (PlanViewResponse::NO_ROBOT, missing),
+        };
         if since.elapsed() > deadline {
-            let code = match (there < scans, without_poses) {
-                (false, Some(_)) => PlanViewResponse::NO_ROBOT,
-                _ => PlanViewResponse::SCANS_MISSING,
-            };
             let text = format!("{missing} within {:.0} s", deadline.as_secs_f64());
             return Err(Box::new(failed(code, text)));
         }
-        tokio::time::sleep(Duration::from_millis(20)).await;
+        tokio::time::sleep(LOOK_EVERY).await;
+    }
+}
+
+/// Waits a little for joint states that say that the robot stands where it was sent to.
+async fn wait_for_rest(desk: &Mutex<Desk>, sent_to: &JointState) {
+    let since = Instant::now();
+    while !sent_to.name.is_empty() && !desk.lock().await.stands_at(sent_to) {
+        if since.elapsed() > REST_DEADLINE {
+            tracing::warn!(
+                "the robot does not stand where it was sent to: the way starts from joint_states"
+            );
+            return;
+        }
+        tokio::time::sleep(LOOK_EVERY).await;
     }
 }
 

@@ -183,6 +183,7 @@ mod tests {
             asked,
             reachable,
             reason: String::new(),
+            refusal: None,
         };
         let taken = Pose::translation(0.25, 0.0, 0.0);
         let plan = Plan {

@@ -79,7 +79,7 @@ impl Desk {
         let object = self.node.params().scan.object_frame;
         let messages: Vec<RegisteredScan> = changed
             .into_iter()
-            .map(|id| messages::scan(id, &intake.scan(id), &object, &cloud.header.frame_id))
+            .map(|id| messages::scan(id, &intake, &object, &cloud.header.frame_id))
             .collect();
         drop(intake);
         for message in messages {
@@ -142,7 +142,7 @@ fn serve_reset(node: &Node<Params>, intake: &Arc<Mutex<Intake>>) -> Result<()> {
         async move {
             let mut intake = intake.lock().await;
             let message = format!("{} scans forgotten", intake.len());
-            *intake = Intake::new(node.params());
+            intake.restart(node.params());
             TriggerResponse { success: true, message }
         }
     })

@@ -7,15 +7,17 @@ use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::Stamp;
 use puffer_shell::convert::{pose_message, pose_with_covariance, scan_message, status_message};
-use puffer_shell::scans::{Intake, Registered};
+use puffer_shell::scans::Intake;
 
 fn header(stamp: Stamp, frame: &str) -> Header {
     let (sec, nanosec) = stamp.parts();
     Header { stamp: Time { sec, nanosec }, frame_id: frame.to_owned() }
 }
 
-/// A scan, seen by a sensor with the frame `sensor`.
-pub(crate) fn scan(id: usize, scan: &Registered, object: &str, sensor: &str) -> RegisteredScan {
+/// Scan `id` as it stands, seen by a sensor with the frame `sensor`.
+pub(crate) fn scan(id: usize, intake: &Intake, object: &str, sensor: &str) -> RegisteredScan {
+    let scan = intake.scan(id);
+    let (accepted, accepted_versions) = intake.accepted();
     let verdict = scan.verdict;
     let covariance = verdict.map_or_else(Mat6::zeros, |v| v.covariance);
     let free = verdict.map_or(&[][..], |v| &v.free_directions);
@@ -34,6 +36,8 @@ pub(crate) fn scan(id: usize, scan: &Registered, object: &str, sensor: &str) -> 
         rmse: verdict.map_or(f64::NAN, |v| v.rmse),
         correspondences: verdict.map_or(0, |v| v.correspondences as u32),
         free_directions: free.iter().flat_map(|twist| twist.iter().copied()).collect(),
+        accepted,
+        accepted_versions,
     }
 }
 

@@ -88,7 +88,7 @@ impl Desk {
         let scans: Vec<RegisteredScan> = intake
             .usable()
             .into_iter()
-            .map(|id| messages::scan(id, &intake.scan(id), &object, SENSOR_FRAME))
+            .map(|id| messages::scan(id, &intake, &object, SENSOR_FRAME))
             .collect();
         drop(intake);
         for scan in &scans {
@@ -116,6 +116,9 @@ impl Desk {
             accepted: accepted as u32,
             refused: (registration.verdicts.len() - accepted) as u32,
             residual: registration.residual,
+            ids: message.ids,
+            versions: message.versions,
+            status: message.status,
             ..RefineResult::default()
         })
     }

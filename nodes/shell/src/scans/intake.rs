@@ -13,6 +13,8 @@ pub struct Intake {
     params: RegistrarParams,
     registrar: Registrar,
     entries: Vec<Entry>,
+    /// Versions told before the first of these scans.
+    versions_before: u32,
 }
 
 /// One scan.
@@ -27,7 +29,7 @@ struct Entry {
 
 /// A scan as it stands.
 pub struct Registered<'a> {
-    /// How often something new was said of it.
+    /// Grows with whatever new is said of it.
     pub version: u32,
     /// When it was taken.
     pub stamp: Stamp,
@@ -56,7 +58,15 @@ impl Intake {
     /// Without scans.
     pub fn new(params: RegistrarParams) -> Intake {
         let registrar = Registrar::new(params.scan.pose_sigma(), params.register.clone());
-        Intake { params, registrar, entries: Vec::new() }
+        Intake { params, registrar, entries: Vec::new(), versions_before: 0 }
+    }
+
+    /// Forgets all scans. Versions go on from theirs, so that a scan told before is not taken for one of the same number
+    /// that comes now.
+    pub fn restart(&mut self, params: RegistrarParams) {
+        let newest = self.entries.iter().map(|entry| entry.version).max();
+        let versions_before = newest.unwrap_or(self.versions_before);
+        *self = Intake { versions_before, ..Intake::new(params) };
     }
 
     /// Number of scans.
@@ -83,7 +93,8 @@ impl Intake {
             Err(error) => Err(error.to_string()),
         };
         let good = place.is_ok();
-        self.entries.push(Entry { observation, cut, place, version: 1 });
+        let version = self.versions_before + 1;
+        self.entries.push(Entry { observation, cut, place, version });
         let (Ok(prepared), true) = (prepared, good) else { return vec![id] };
         let changed = self.registrar.add(&prepared, &self.entries[id].observation.prior);
         let ids: Vec<usize> = changed.into_iter().filter_map(|place| self.id_of(place)).collect();
@@ -98,7 +109,8 @@ impl Intake {
     pub fn add_unusable(&mut self, stamp: Stamp, reason: String) -> usize {
         let observation = Observation::nothing(stamp);
         let (cut, place) = (Cut::default(), Err(reason));
-        self.entries.push(Entry { observation, cut, place, version: 1 });
+        let version = self.versions_before + 1;
+        self.entries.push(Entry { observation, cut, place, version });
         self.entries.len() - 1
     }
 
@@ -131,6 +143,13 @@ impl Intake {
         let Cut { object, beyond } = &entry.cut;
         let version = entry.version;
         Registered { version, stamp, scan: object, beyond, prior, pose, verdict, reason }
+    }
+
+    /// The numbers of the scans that are accepted, ascending, and the version of each.
+    pub fn accepted(&self) -> (Vec<u32>, Vec<u32>) {
+        let scans = (0..self.entries.len()).map(|id| (id, self.scan(id)));
+        let accepted = scans.filter(|(_, scan)| scan.status() == Status::Accepted);
+        accepted.map(|(id, scan)| (id as u32, scan.version)).unzip()
     }
 
     /// The numbers of the scans that can be registered, in the order of [`Intake::refine`]'s lists.
@@ -182,3 +201,25 @@ impl Intake {
 
 /// Oriented points without which a scan shows no surface worth registering.
 const LEAST_POINTS: usize = 100;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_restart_forgets_the_scans_but_not_the_versions() {
+        let mut intake = Intake::new(RegistrarParams::default());
+        let add = |intake: &mut Intake| {
+            let id = intake.add_unusable(Stamp::default(), "no transform".to_owned());
+            (id, intake.scan(id).version)
+        };
+        assert_eq!([add(&mut intake), add(&mut intake)], [(0, 1), (1, 1)]);
+        intake.restart(RegistrarParams::default());
+        assert!(intake.is_empty());
+        assert_eq!(add(&mut intake), (0, 2));
+        intake.restart(RegistrarParams::default());
+        intake.restart(RegistrarParams::default());
+        assert_eq!(add(&mut intake), (0, 3));
+        assert_eq!(intake.accepted(), (vec![], vec![]));
+    }
+}
