@@ -13,6 +13,7 @@ mod evidence;
 mod factors;
 mod joint;
 mod layers;
+mod normals;
 mod pair;
 mod place;
 mod prepare;
@@ -182,6 +183,10 @@ fn register_samples(
     Ok(registration)
 }
 
+#[cfg(test)]
+mod breathing_tests;
+#[cfg(test)]
+mod sharp_shapes_tests;
 #[cfg(test)]
 mod symmetric_tests;
 #[cfg(test)]
