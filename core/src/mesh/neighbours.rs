@@ -111,10 +111,9 @@ mod tests {
         let edges: u32 = LINK.iter().map(|l| l.count_ones()).sum::<u32>() / 2;
         let mut triangles = 0;
         for (a, link) in LINK.iter().enumerate() {
-            for b in a + 1..STEPS.len() {
-                if link >> b & 1 == 1 {
-                    triangles += (link & LINK[b] & !((1 << b) - 1) & !(1 << b)).count_ones();
-                }
+            let (after, own) = (!0 << (a + 1), *link);
+            for (b, other) in LINK.iter().enumerate().filter(|(b, _)| own & after & 1 << b != 0) {
+                triangles += (own & other & !0 << (b + 1)).count_ones();
             }
         }
         assert_eq!((edges, triangles), (36, 24));
