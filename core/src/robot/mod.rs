@@ -28,6 +28,7 @@ mod workcell;
 pub use collision::Obstacle;
 pub use description::{SETUPS, description, home};
 pub use model::{Joint, JointKind, LinkShape, RobotModel};
+pub(crate) use reach::HALF_SWEEP_STEPS;
 pub use reach::{Hindrance, Reach, ReachRequest, Reached, slide_range};
 pub use self_filter::BodyFilter;
 pub use timing::Trajectory;

@@ -93,8 +93,9 @@ pub fn slide_range(sensor: &SensorModel, share: f64) -> [f64; 2] {
     [-back, forth]
 }
 
-/// Points of a sweep to either side of the middle.
-const HALF_STEPS: usize = 6;
+/// Points of a sweep to either side of the middle: as many as the simulated driver sweeps with, so that what was found
+/// possible is not refused there.
+pub(crate) const HALF_SWEEP_STEPS: usize = 12;
 /// Seeds of the first search, at the viewpoint itself, and of the second, with the slide free.
 const SEEDS: [usize; 2] = [24, 96];
 /// Configurations that one search for a way may end in, and how many searches are made.
@@ -207,7 +208,7 @@ impl Workcell {
         if request.sweep <= 0.0 {
             return Some(Candidate { member, sweep: None });
         }
-        match sweep::swept(space, &self.chain, &member.q, request.sweep, HALF_STEPS) {
+        match sweep::swept(space, &self.chain, &member.q, request.sweep, HALF_SWEEP_STEPS) {
             Ok(sweep) => Some(Candidate { member, sweep: Some(sweep) }),
             Err(why) => {
                 failures.sweeping += 1;

@@ -3,7 +3,9 @@
 use super::{NoiseFamily, SimulatedView, Simulator, objects};
 use crate::geometry::{Cloud, SensorModel, StereoModel, StriperModel, Surface, Vec3};
 use crate::mesh::Mesh;
-use crate::robot::{Obstacle, RobotModel, SENSOR_FRAME, Trajectory, Workcell, description, home};
+use crate::robot::{
+    HALF_SWEEP_STEPS, Obstacle, RobotModel, SENSOR_FRAME, Trajectory, Workcell, description, home,
+};
 use crate::voxel::{Voxel, voxel_of};
 use crate::{Error, Result};
 use rustc_hash::FxHashSet;
@@ -12,8 +14,6 @@ use rustc_hash::FxHashSet;
 const JAWS: &str = "gripper_left_joint";
 /// The jaws hold this much of the object's lower end, metres.
 const GRIP: f64 = 0.02;
-/// Steps of a sweep to either side.
-const HALF_SWEEP_STEPS: usize = 12;
 
 /// The simulated truth of a set-up. The object stands on z = 0 of the object frame, on the table or between the jaws.
 pub struct Cell {
