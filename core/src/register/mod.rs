@@ -13,7 +13,6 @@ mod evidence;
 mod factors;
 mod joint;
 mod layers;
-mod normals;
 mod pair;
 mod place;
 mod prepare;
@@ -183,10 +182,6 @@ fn register_samples(
     Ok(registration)
 }
 
-#[cfg(test)]
-mod breathing_tests;
-#[cfg(test)]
-mod sharp_shapes_tests;
 #[cfg(test)]
 mod symmetric_tests;
 #[cfg(test)]
