@@ -58,6 +58,12 @@ impl Correlation {
         1.0 / (1.0 + alike)
     }
 
+    /// That of normals that are fitted to measurements within `radius` (metres) of each other: they
+    /// share neighbours besides.
+    pub(crate) fn of_normals(&self, radius: f64) -> Correlation {
+        Correlation { share: 1.0, length: radius.hypot(self.share.sqrt() * self.length) }
+    }
+
     /// rho at a distance, metres.
     pub(crate) fn at(&self, distance: f64) -> f64 {
         if distance == 0.0 { 1.0 } else { self.share * (-(distance / self.length).powi(2)).exp() }

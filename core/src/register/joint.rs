@@ -2,14 +2,16 @@
 //! (multi-view registration; Pulli 1999 for the problem, Barfoot 2017 for the perturbations). No scan is fixed, so
 //! that the error is spread and the priors alone place the whole.
 //!
-//! The height of each patch of the surface is an unknown of its own, eliminated in `equations`: each measurement counts
-//! once, however many scans saw the same place. What neighbouring measurements of one scan share in noise is learnt from
-//! the residuals (`correlation`) and taken out (`whiten`).
+//! The height of each patch of the surface is an unknown of its own, eliminated in `equations`:
+//! each measurement counts once, however many scans saw the same place. What neighbouring
+//! measurements of one scan share in noise is learnt from the residuals (`correlation`) and taken
+//! out (`whiten`). What only the noise of normals pretends to know is left to the priors (`trust`).
 
 use super::correlation::{Correlation, Residuals};
 use super::equations::{Row, reduced};
 use super::sample::Sample;
 use super::surfels::{OnSurfel, Surfels, Term, terms};
+use super::trust::{Seen, SharedNoise, Trust};
 use super::verdict::Status;
 use super::whiten::{WhiteRow, whiten};
 use super::{RegisterParams, Registration};
@@ -20,8 +22,9 @@ use rayon::prelude::*;
 
 /// The search radius shrinks to its end by this factor a pass.
 const SHRINK: f64 = 0.6;
-/// A step below this many standard deviations of a pose ends the search: surfels laid anew move poses by half of it.
-const SMALL_STEP: f64 = 0.3;
+/// A step below this many standard deviations of a pose ends the search: surfels laid anew move
+/// poses by a third of it.
+const SMALL_STEP: f64 = 0.5;
 /// Steps at the finest scale are this much longer (over-relaxation; below 2 it converges).
 const RELAXATION: f64 = 1.7;
 /// Surfels along the diagonal of the largest scan at most: finer ones cost time and tell nothing new.
@@ -63,28 +66,35 @@ pub(crate) fn optimise(
         let at_end = now.reach <= end.reach;
         let found = Measured::new(&scans, &poses, now, at_end, params);
         let (geometry, mut gradient) = found.system()?;
+        let mut stiffness = geometry.clone();
         hessian = geometry;
+        if at_end {
+            let trust = found.trust(&poses, &prior, now.edge).ok_or_else(singular)?;
+            gradient = trust.gradient(&gradient);
+            stiffness = trust.stiffness(&hessian);
+            hessian = trust.information(&hessian);
+            // New surfels follow the scans that they are made of: a full step goes a part of the
+            // way only. The prior stays.
+            if pass + 1 < params.joint_iterations {
+                stiffness /= RELAXATION;
+            }
+        }
         for (k, pose) in poses.iter().enumerate() {
             let mut block = hessian.fixed_view_mut::<6, 6>(6 * k, 6 * k);
+            block += prior;
+            let mut block = stiffness.fixed_view_mut::<6, 6>(6 * k, 6 * k);
             block += prior;
             let mut rows = gradient.fixed_rows_mut::<6>(6 * k);
             rows += prior * log(&(robot[members[k]].inverse() * pose));
         }
-        let Some(solver) = hessian.clone().cholesky() else {
-            return Err(Error::input(
-                "the joint registration is singular: is a pose sigma infinite?",
-            ));
-        };
+        let solver = stiffness.cholesky().ok_or_else(singular)?;
         let step = solver.solve(&-gradient);
-        // New surfels follow the scans that they are made of: a full step goes a part of the way only.
-        let last = pass + 1 == params.joint_iterations;
-        let relaxation = if at_end && !last { RELAXATION } else { 1.0 };
         let mut moved = 0.0_f64;
         for (k, pose) in poses.iter_mut().enumerate() {
             let xi: Twist = step.fixed_rows::<6>(6 * k).into_owned();
             let block: Mat6 = hessian.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
             moved = moved.max(xi.dot(&(block * xi)).sqrt());
-            *pose *= exp(&(xi * relaxation));
+            *pose *= exp(&xi);
         }
         if at_end && moved < SMALL_STEP {
             break;
@@ -100,6 +110,10 @@ pub(crate) fn optimise(
         }
     }
     Ok(())
+}
+
+fn singular() -> Error {
+    Error::input("the joint registration is singular: is a pose sigma infinite?")
 }
 
 fn accepted(samples: &[Sample], registration: &Registration) -> Vec<usize> {
@@ -139,7 +153,7 @@ impl Scale {
 
 /// All scans' measurements of the common surface.
 struct Measured {
-    surfels: usize,
+    surfels: Surfels,
     /// One list a scan.
     terms: Vec<Vec<Term>>,
     /// Measurements of places that other scans saw too.
@@ -152,6 +166,8 @@ struct Measured {
     /// What a measurement counts for beside the priors, and what its neighbours share with it.
     share: f64,
     correlation: Correlation,
+    /// Within how far the points around one have a say in its normal, metres.
+    normal_radius: f64,
 }
 
 impl Measured {
@@ -185,7 +201,7 @@ impl Measured {
             term.residual -= heights[term.surfel as usize].0;
         }
         let mut found = Measured {
-            surfels: count,
+            surfels,
             terms,
             redundant,
             scale,
@@ -193,6 +209,7 @@ impl Measured {
             within,
             share: params.information_share,
             correlation: Correlation::NONE,
+            normal_radius: median(scans.iter().map(|s| s.normal_radius).collect()).unwrap_or(0.0),
         };
         if at_end {
             let residuals: Vec<Residuals> =
@@ -216,7 +233,34 @@ impl Measured {
     /// Hessian and gradient by the poses of the geometry's half squared error.
     fn system(&self) -> Result<(DMatrix<f64>, DVector<f64>)> {
         let rows: Vec<Vec<Row>> = self.terms.par_iter().map(|terms| self.rows(terms)).collect();
-        reduced(&rows, self.surfels)
+        reduced(&rows, self.surfels.centers.len())
+    }
+
+    /// How far the geometry is to be trusted; surfels lie `edge` (metres) apart.
+    fn trust(&self, poses: &[Pose], prior: &Mat6, edge: f64) -> Option<Trust> {
+        let of_normals = self.correlation.of_normals(self.normal_radius);
+        let noise = SharedNoise {
+            rho: self.correlation.share,
+            independent: of_normals.independent_share(edge),
+        };
+        Trust::new(&self.seen(), poses, prior, noise)
+    }
+
+    /// What each scan saw of each surfel, by surfel.
+    fn seen(&self) -> Vec<Seen> {
+        let of_term = |(scan, term): (usize, &Term)| Seen {
+            surfel: term.surfel,
+            scan,
+            weight: self.precision(term).powi(2),
+            center: self.surfels.centers[term.surfel as usize],
+            own: term.normal,
+            shared: self.surfels.normals[term.surfel as usize],
+        };
+        let terms = self.terms.iter().enumerate();
+        let terms = terms.flat_map(|(scan, terms)| terms.iter().map(move |term| (scan, term)));
+        let mut seen: Vec<Seen> = terms.map(of_term).collect();
+        seen.sort_by_key(|s| (s.surfel, s.scan));
+        seen
     }
 
     /// The equations of one scan, their noise white.

@@ -13,6 +13,7 @@ mod evidence;
 mod factors;
 mod joint;
 mod layers;
+mod normals;
 mod pair;
 mod place;
 mod prepare;
@@ -23,6 +24,7 @@ mod sample;
 mod sigma;
 mod stages;
 mod surfels;
+mod trust;
 mod variants;
 mod verdict;
 mod whiten;
@@ -173,7 +175,8 @@ fn register_samples(
         joint::optimise(samples, robot, &mut registration, Start::Coarse, params, progress)?;
         // The first scans' errors had moved the map away from the priors. It stands right now: what was refused
         // for that reason has another chance, and what came to rest wrongly.
-        let joined = stages::place_rest(samples, robot, &mut registration, params, progress)?;
+        let mut joined = stages::place_rest(samples, robot, &mut registration, params, progress)?;
+        joined += stages::tie(samples, robot, &mut registration, params, progress)?;
         if revise(samples, robot, &mut registration, params) + joined > 0 {
             joint::optimise(samples, robot, &mut registration, Start::Fine, params, progress)?;
         }
@@ -182,6 +185,10 @@ fn register_samples(
     Ok(registration)
 }
 
+#[cfg(test)]
+mod breathing_tests;
+#[cfg(test)]
+mod sharp_shapes;
 #[cfg(test)]
 mod symmetric_tests;
 #[cfg(test)]

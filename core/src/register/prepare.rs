@@ -1,6 +1,7 @@
 //! From a raw scan to oriented points in the sensor frame.
 
-use crate::geometry::{Cloud, KdTree, NoiseModel, Residual, Scan, Vec3, fit_plane, median};
+use super::normals::{Neighbourhood, normals};
+use crate::geometry::{Cloud, KdTree, NoiseModel, Residual, Scan, Vec3, median};
 use crate::voxel::{CellIndex, most_central};
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -49,10 +50,6 @@ const PROBES: usize = 1500;
 const RESIDUALS: usize = 20_000;
 /// Radius, in spacings, of the planes whose residuals tell the noise.
 const SMALL: f64 = 2.0;
-/// Fewer neighbours than this support no plane.
-const LEAST_NEIGHBOURS: usize = 6;
-/// Beyond this angle of incidence a "surface" is mostly flying points between two depths.
-const GRAZING: f64 = 80.0;
 /// Points of a scan that are kept at most: above, neighbours are merged, which loses no information because
 /// such scans are far denser than the finest mesh made of them.
 const MOST_POINTS: usize = 200_000;
@@ -81,14 +78,8 @@ impl PreparedScan {
         let residuals =
             (0..points.len()).step_by(stride).filter_map(|i| probe.fit(i)).map(|f| f.noise);
         let noise = median(residuals.collect()).unwrap_or(0.0);
-        // The tilt of a plane fitted to n points within r is about 2 noise / (r sqrt(n)): six times the noise
-        // keeps it to a few degrees.
-        let radius = (3.0 * spacing).max(6.0 * noise);
-        let fits = Neighbourhood::new(points, radius);
-        let oriented: Vec<Option<Vec3>> = (0..points.len())
-            .into_par_iter()
-            .map(|i| oriented_normal(&fits, i, &raw.rays[i], noise))
-            .collect();
+        let near = Neighbourhood::new(points, normal_radius(spacing, noise));
+        let oriented = normals(&near, &raw.rays, noise);
         let model = raw.noise_model(&oriented, spacing).unwrap_or(NoiseModel::constant(noise));
         Ok(raw
             .prepared(&oriented, PreparedScan { spacing, noise, model, ..PreparedScan::default() }))
@@ -122,6 +113,11 @@ impl PreparedScan {
             source: (0..cloud.len() as u32).collect(),
             ..PreparedScan::default()
         })
+    }
+
+    /// Within how far the points around one have a say in its normal, metres.
+    pub(crate) fn normal_radius(&self) -> f64 {
+        normal_radius(self.spacing, self.noise)
     }
 
     /// One point a cubic cell, so that about `count` remain: indices, ascending by cell.
@@ -228,6 +224,12 @@ impl Raw {
     }
 }
 
+/// Radius of the planes that normals are taken from, metres. The tilt of a plane fitted to n points
+/// within r is about 2 noise / (r sqrt(n)): six times the noise keeps it to a few degrees.
+fn normal_radius(spacing: f64, noise: f64) -> f64 {
+    (3.0 * spacing).max(6.0 * noise)
+}
+
 fn median_spacing(points: &[Vec3]) -> f64 {
     let tree = KdTree::new(points);
     let stride = points.len().div_ceil(PROBES);
@@ -237,57 +239,6 @@ fn median_spacing(points: &[Vec3]) -> f64 {
         .filter_map(|p| tree.nearest_n(p, 4).last().map(|f| f.1.sqrt()));
     // The third neighbour lies at about one grid step, also where the grid is stretched in one direction.
     median(nearest.collect()).unwrap_or(0.0)
-}
-
-struct Neighbourhood<'a> {
-    points: &'a [Vec3],
-    cells: CellIndex,
-    radius: f64,
-}
-
-struct LocalFit {
-    normal: Vec3,
-    center: Vec3,
-    noise: f64,
-    count: f64,
-}
-
-impl<'a> Neighbourhood<'a> {
-    fn new(points: &'a [Vec3], radius: f64) -> Self {
-        Neighbourhood { points, cells: CellIndex::new(points, radius), radius }
-    }
-
-    fn fit(&self, index: usize) -> Option<LocalFit> {
-        let mut neighbours = Vec::with_capacity(64);
-        self.cells.for_each_within(self.points, &self.points[index], self.radius, |i, _| {
-            neighbours.push(i)
-        });
-        let count = neighbours.len() as f64;
-        if neighbours.len() < LEAST_NEIGHBOURS {
-            return None;
-        }
-        let fit = fit_plane(neighbours.iter().map(|&i| (self.points[i], 1.0)))?;
-        // A neighbourhood as thick as it is wide is no surface.
-        if fit.variances[0] > 0.25 * fit.variances[1] {
-            return None;
-        }
-        let noise = (fit.variances[0] * count / (count - 3.0)).sqrt();
-        Some(LocalFit { normal: fit.normal, center: fit.center, noise, count })
-    }
-}
-
-fn oriented_normal(fits: &Neighbourhood, index: usize, ray: &Vec3, noise: f64) -> Option<Vec3> {
-    let fit = fits.fit(index)?;
-    let cosine = fit.normal.dot(ray);
-    if cosine.abs() < GRAZING.to_radians().cos() {
-        return None;
-    }
-    // Beyond four standard deviations only outliers are expected: one good point in 16,000.
-    let off = (fits.points[index] - fit.center).dot(&fit.normal).abs();
-    if off > 4.0 * noise.max(fit.noise) {
-        return None;
-    }
-    Some(if cosine > 0.0 { -fit.normal } else { fit.normal })
 }
 
 #[cfg(test)]

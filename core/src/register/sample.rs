@@ -22,6 +22,8 @@ pub(crate) struct Sample {
     /// Distance between the targets, metres.
     pub target_spacing: f64,
     pub noise: f64,
+    /// Within how far the points around one have a say in its normal, metres.
+    pub normal_radius: f64,
     /// Median distance of the points from the sensor, metres.
     pub distance: f64,
     /// Diagonal of the points' box, metres.
@@ -46,6 +48,7 @@ impl Sample {
             rays: kept.iter().map(|&i| scan.rays[i]).collect(),
             normals: kept.iter().map(|&i| scan.normals[i]).collect(),
             noise: scan.noise.max(1e-6),
+            normal_radius: scan.normal_radius(),
             target_spacing,
             target_boundary,
             distance: median(points.iter().map(Vec3::norm).collect()).unwrap_or(0.0),

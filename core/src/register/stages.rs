@@ -1,6 +1,7 @@
 //! The two stages (Wiedemann 2014, §2.3.1): align each scan to the map, then try those put aside again.
 
 use super::align::{Map, Prior, correspondences};
+use super::joint::{Start, optimise};
 use super::place::place;
 use super::sample::Sample;
 use super::verdict::{Status, Verdict};
@@ -72,6 +73,47 @@ fn most_central(
     };
     let order = (0..samples.len()).into_par_iter().map(|i| (shared(i), std::cmp::Reverse(i)));
     order.max().map_or(0, |(_, std::cmp::Reverse(i))| i)
+}
+
+/// Tries to place scans that fit each of the others alone, but not all of them: two scans that
+/// share a face are put together in the directions that it holds, and stay where the robot says in
+/// the others. A third that shares faces with both ties them in these directions too, but as they
+/// stand it fits one of them only. So all are moved together first; each must then lie on the
+/// surface of those accepted before. Returns how many joined.
+pub(crate) fn tie(
+    samples: &[Sample],
+    robot: &[Pose],
+    registration: &mut Registration,
+    params: &RegisterParams,
+    progress: &Progress,
+) -> Result<usize> {
+    let near = |verdict: &Verdict| {
+        verdict.status != Status::Accepted
+            && verdict.overlap >= params.min_overlap
+            && verdict.correspondences >= params.min_correspondences
+    };
+    let waiting: Vec<usize> =
+        (0..samples.len()).filter(|&i| near(&registration.verdicts[i])).collect();
+    if waiting.is_empty() {
+        return Ok(0);
+    }
+    let mut tied = registration.clone();
+    waiting.iter().for_each(|&i| tied.verdicts[i].status = Status::Accepted);
+    optimise(samples, robot, &mut tied, Start::Coarse, params, progress)?;
+    for &i in &waiting {
+        tied.verdicts[i].status = Status::Refused;
+        tied.poses[i] = robot[i];
+    }
+    let joined = place_rest(samples, robot, &mut tied, params, progress)?;
+    if joined == 0 {
+        return Ok(0);
+    }
+    if joined < waiting.len() {
+        // The others' pull goes with them.
+        optimise(samples, robot, &mut tied, Start::Coarse, params, progress)?;
+    }
+    *registration = tied;
+    Ok(joined)
 }
 
 /// Tries to place all scans that are not accepted, each time the one that overlaps most with the map; one that fails

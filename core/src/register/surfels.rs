@@ -34,6 +34,8 @@ pub(crate) struct Term {
     pub variance: f64,
     /// Mean place of the points on the surface, sensor frame, metres.
     pub at: Vec3,
+    /// Mean of the points' own normals, object frame.
+    pub normal: Vec3,
 }
 
 /// A measured point with its normal and ray, object frame.
@@ -50,6 +52,7 @@ pub(crate) struct OnSurfel {
     residual: f64,
     jacobian: Twist,
     at: Vec3,
+    normal: Vec3,
 }
 
 /// Points of a scan that are looked at: more tell nothing new, because neighbours share their noise.
@@ -162,7 +165,7 @@ impl Surfels {
             let at = pose.rotation.inverse_transform_vector(&(foot - pose.translation.vector));
             let (_, jacobian) =
                 point_to_plane(pose, &at, &self.centers[index], &self.normals[index]);
-            Some(OnSurfel { surfel: index as u32, residual, jacobian, at })
+            Some(OnSurfel { surfel: index as u32, residual, jacobian, at, normal: ray.normal })
         };
         let stride = sample.targets.len().div_ceil(POINTS).max(1);
         let mut found: Vec<OnSurfel> =
@@ -181,7 +184,7 @@ pub(crate) fn terms(met: &[OnSurfel], scale: f64) -> Vec<Term> {
 /// The mean of one scan's measurements of one surfel.
 fn mean(found: &[OnSurfel], scale: f64) -> Option<Term> {
     let (mut weight, mut residual, mut square) = (0.0, 0.0, 0.0);
-    let (mut jacobian, mut at) = (Twist::zeros(), Vec3::zeros());
+    let (mut jacobian, mut at, mut normal) = (Twist::zeros(), Vec3::zeros(), Vec3::zeros());
     for on in found {
         let robust = tukey(on.residual / scale);
         weight += robust;
@@ -189,6 +192,7 @@ fn mean(found: &[OnSurfel], scale: f64) -> Option<Term> {
         square += robust * on.residual * on.residual;
         jacobian += on.jacobian * robust;
         at += on.at * robust;
+        normal += on.normal * robust;
     }
     residual /= weight;
     (weight >= LEAST_WEIGHT).then_some(Term {
@@ -198,6 +202,7 @@ fn mean(found: &[OnSurfel], scale: f64) -> Option<Term> {
         jacobian: jacobian / weight,
         variance: (square / weight - residual * residual).max(0.0),
         at: at / weight,
+        normal: normal / weight,
     })
 }
 
