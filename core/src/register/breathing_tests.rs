@@ -1,7 +1,7 @@
 //! Scans of objects with sharp edges must not be moved towards their sensors, which no residual
 //! shows: the object would grow.
 
-use super::sharp_shapes::{displaced, jittered, look, shape, views};
+use super::sharp_shapes_tests::{displaced, jittered, look, shape, views};
 use super::*;
 use crate::geometry::{Scan, Vec3, exp};
 use rand::SeedableRng;

@@ -188,7 +188,7 @@ fn register_samples(
 #[cfg(test)]
 mod breathing_tests;
 #[cfg(test)]
-mod sharp_shapes;
+mod sharp_shapes_tests;
 #[cfg(test)]
 mod symmetric_tests;
 #[cfg(test)]
