@@ -46,9 +46,9 @@ const SIGNIFICANT: f64 = 2.0;
 /// H holds this share of the prior besides, so that directions in which the geometry says nothing
 /// at all have a length.
 const PRIOR_SHARE: f64 = 0.01;
-/// Products of two scans' normals that the standard errors are taken from, at most: with a hundred
-/// scans every fifth patch or so.
-const MAX_PRODUCTS: usize = 40_000_000;
+/// Products of two scans' normals that the standard errors are taken from, at most: of twenty-six
+/// dense laser scans every fifth patch or so, so that they take no time beside the equations.
+const MAX_PRODUCTS: usize = 5_000_000;
 
 /// What the noise of neighbouring patches has in common.
 #[derive(Clone, Copy)]
