@@ -17,12 +17,17 @@ use std::collections::BinaryHeap;
 const MIN_BODY_RATIO: f64 = 0.01;
 /// Value of a corner whose side the filter decided against its sign: the surface passes close to it.
 const DECIDED_VALUE: f32 = 1e-3;
+/// The margin as a share of the deepest value at most: with scans from few sides nothing lies inside by a whole margin.
+const MAX_MARGIN_RATIO: f32 = 0.5;
 /// Label of corners outside.
 const OUTSIDE: u32 = 0;
 
-/// Gives `lattice` (negative inside) the bodies that its values support by `margin`, the `max_bodies` largest at
-/// most, without voids: values whose sign says something else come to lie just on the other side of zero.
+/// Gives `lattice` (negative inside) the bodies that its values support by `margin`, or by half of the deepest value if that
+/// is less, the `max_bodies` largest at most, without voids: values whose sign says something else come to lie just on
+/// the other side of zero.
 pub(super) fn filter_topology(lattice: &mut Lattice, margin: f32, max_bodies: usize) {
+    let deepest = lattice.values.iter().copied().fold(0.0, f32::min);
+    let margin = margin.min(-MAX_MARGIN_RATIO * deepest);
     let mut bodies = Bodies::core(lattice, margin);
     bodies.grow(margin);
     bodies.keep_largest(max_bodies);

@@ -71,6 +71,14 @@ fn bodies_merge_only_inside_and_the_largest_are_kept() {
 }
 
 #[test]
+fn a_body_that_nothing_supports_by_the_whole_margin_is_there_all_the_same() {
+    // As of scans from one side only: everywhere close to the border.
+    let weak = |p: &Vec3| (p.norm() - 1.0).clamp(-0.1, 1.0);
+    assert_eq!(filtered(lattice(weak), 1), (2, 1));
+    assert_eq!(filtered(lattice(|p| p.norm() + 0.1), 1), (0, 0));
+}
+
+#[test]
 fn voids_are_filled_whatever_their_value() {
     let hollow = |p: &Vec3| ((p.norm() - 0.8).abs() - 0.4) / 0.2;
     assert_eq!(filtered(lattice(hollow), 1), (2, 1));

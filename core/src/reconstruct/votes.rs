@@ -19,8 +19,10 @@ const MIN_SIGMA: f64 = 0.3;
 /// Adds to the values of `lattice` the votes of sheets that face each other, scaled so that a whole sheet votes -1 just
 /// inside and 1 just outside:
 ///
-///     V(x) = o sum_i w_i erf(t_i / (sigma_i sqrt 2)),   w_i = a_i G(l_i) (1 - |t_i| / tau)
-///     o(x) = 1 - |sum_i w_i n_i| / sum_i w_i
+/// ```text
+/// V(x) = o sum_i w_i erf(t_i / (sigma_i sqrt 2)),   w_i = a_i G(l_i) (1 - |t_i| / tau)
+/// o(x) = 1 - |sum_i w_i n_i| / sum_i w_i
+/// ```
 ///
 /// with `t_i` the distance of x from the point's plane along its normal `n_i`, `l_i` that along the plane, `a_i` the
 /// area that the point stands for, `G` a normal density in the plane, and `tau` the reach. The taper lets the nearer of

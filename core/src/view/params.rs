@@ -68,7 +68,7 @@ crate::params! {
         /// Time of a scan, added to that of the motion where gain per second counts.
         scan_time: f64 = 5.0, in [0.1, 1000.0], unit "s";
         /// Share of the rays into the object that must meet known surface as a sensor measures it, for registration.
-        min_overlap: f64 = 0.1, in [0.0, 1.0];
+        min_overlap: f64 = 0.2, in [0.0, 1.0];
         /// Planning ends when no view gains this share of the known surface voxels; 0 wants the last one.
         min_gain: f64 = 0.005, in [0.0, 1.0];
         /// Scans that look at a voxel in vain before it counts as not measurable.
