@@ -56,7 +56,7 @@ fn sample(cloud: &Cloud, winding: &Winding, spacing: f64, progress: &Progress) -
     if corners > MAX_CORNERS {
         return Err(Error::input(format!(
             "a lattice of {:.2} mm over {:.2} m has {corners:.1e} corners, {MAX_CORNERS:.0e} are allowed: raise \
-             reconstruct.edge_length",
+             reconstruct.edge_length or reconstruct.voxel_edge",
             spacing * 1e3,
             bounds.extent().max()
         )));

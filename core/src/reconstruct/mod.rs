@@ -15,7 +15,7 @@ mod topology;
 mod votes;
 mod winding;
 
-use crate::geometry::{Cloud, Vec3, median};
+use crate::geometry::{Aabb, Cloud, Vec3, median};
 use crate::mesh::{HalfEdgeMesh, Mesh};
 use crate::scans::Support;
 use crate::{Progress, Result};
@@ -99,6 +99,10 @@ const MIN_GAP_SIGMAS: f64 = 3.0;
 /// Distance of the lattice's corners per distance of points at least, however noisy these are.
 const MIN_LATTICE_PER_SPACING: f64 = 0.4;
 
+/// Corners of the lattice at most, unless its spacing is given: beyond it thin walls are not worth the time (some seconds),
+/// and the lattice is coarser, up to the edge length of the mesh.
+const MAX_AUTOMATIC_CORNERS: f64 = 3e7;
+
 impl Scale {
     fn of(cloud: &Cloud, params: &ReconstructParams) -> Scale {
         let points = spacing(cloud);
@@ -108,7 +112,10 @@ impl Scale {
         let sigma = median(cloud.sigma.iter().copied().filter(|s| s.is_finite()).collect());
         let gap = points - MIN_GAP_SIGMAS * sigma.unwrap_or(0.0);
         let finest = MIN_LATTICE_PER_SPACING * points;
-        let lattice = given(params.voxel_edge, (LATTICE_PER_GAP * gap).max(finest).min(edge));
+        let volume = Aabb::of(&cloud.points).extent().iter().product::<f64>();
+        let affordable = (volume / MAX_AUTOMATIC_CORNERS).cbrt();
+        let wanted = (LATTICE_PER_GAP * gap).max(finest).max(affordable);
+        let lattice = given(params.voxel_edge, wanted.min(edge));
         Scale { points, voxel, lattice, edge, start_edge: (params.start_edge * voxel).max(edge) }
     }
 
