@@ -61,6 +61,7 @@ pub(crate) fn optimise(
         Start::Fine => end,
     };
     let mut hessian = DMatrix::zeros(0, 0);
+    let mut passed: Vec<Vec<Pose>> = Vec::new();
     for pass in 0..params.joint_iterations {
         progress.report("optimise", pass as f64 / params.joint_iterations as f64)?;
         let at_end = now.reach <= end.reach;
@@ -97,10 +98,15 @@ pub(crate) fn optimise(
             *pose *= exp(&xi);
         }
         if at_end && moved < SMALL_STEP {
+            passed.clear();
             break;
+        }
+        if at_end && 2 * pass >= params.joint_iterations {
+            passed.push(poses.clone());
         }
         now = now.finer(&end);
     }
+    average(&mut poses, &passed);
     let covariance = hessian.cholesky().map(|c| c.inverse());
     for (k, &i) in members.iter().enumerate() {
         registration.poses[i] = poses[k];
@@ -110,6 +116,20 @@ pub(crate) fn optimise(
         }
     }
     Ok(())
+}
+
+/// Moves `poses` to the mean of all that were `passed`, as far as there are any. With surfels laid
+/// anew in each pass, the steps are noisy: where the geometry tells little, poses wander about their
+/// optimum, and their mean is nearer to it (Polyak & Juditsky 1992, Acceleration of Stochastic
+/// Approximation by Averaging).
+fn average(poses: &mut [Pose], passed: &[Vec<Pose>]) {
+    if passed.is_empty() {
+        return;
+    }
+    for (k, pose) in poses.iter_mut().enumerate() {
+        let away: Twist = passed.iter().map(|poses| log(&(pose.inverse() * poses[k]))).sum();
+        *pose *= exp(&(away / passed.len() as f64));
+    }
 }
 
 fn singular() -> Error {
@@ -358,4 +378,23 @@ pub(crate) fn residual(
     }
     // Two scans' errors lie between two points.
     found.scale * std::f64::consts::SQRT_2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_that_wander_end_in_their_middle() {
+        let middle = exp(&Twist::new(0.1, -0.2, 0.3, 0.4, 0.5, -0.6));
+        let away = Twist::new(1e-3, 2e-3, -1e-3, 2e-3, 1e-3, 3e-3);
+        let steps = [-2.0, 1.0, -1.0, 2.0];
+        let passed: Vec<Vec<Pose>> =
+            steps.iter().map(|step| vec![middle * exp(&(away * *step))]).collect();
+        let mut poses = passed[3].clone();
+        average(&mut poses, &passed);
+        assert!(log(&(middle.inverse() * poses[0])).norm() < 1e-5);
+        average(&mut poses, &[]);
+        assert!(log(&(middle.inverse() * poses[0])).norm() < 1e-5);
+    }
 }
