@@ -114,7 +114,7 @@ pub fn trial_scans(simulated: &SimulatedScans, params: &RegisterParams) -> Resul
         };
         Ok(TrialScan {
             normals: hits.iter().map(normal).collect(),
-            pair: PairScan::new(&prepared, params),
+            pair: PairScan::new(&prepared, simulated.pose_sigma, params),
             center: hits.iter().sum::<Vec3>() / hits.len().max(1) as f64,
             tree: KdTree::new(&hits),
             near: 1.5 * prepared.spacing * (step as f64).sqrt(),

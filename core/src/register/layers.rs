@@ -49,7 +49,7 @@ pub(crate) fn doubled(sample: &Sample, map: &Map, pose: &Pose, reach: f64) -> Op
 mod tests {
     use super::*;
     use crate::geometry::Scan;
-    use crate::register::{PreparedScan, RegisterParams};
+    use crate::register::{PoseSigma, PreparedScan, RegisterParams};
 
     /// A sheet 0.5 m away, bent by `bend` (1 / metres), and its other side 2 mm behind.
     fn sample(bend: f32) -> Sample {
@@ -60,7 +60,8 @@ mod tests {
             })
             .collect();
         let scan = Scan { points, width: 80, origins: Vec::new() };
-        Sample::new(&PreparedScan::new(&scan).unwrap(), &RegisterParams::default())
+        let exact = PoseSigma { translation: 0.0, rotation: 0.0 };
+        Sample::new(&PreparedScan::new(&scan).unwrap(), exact, &RegisterParams::default())
     }
 
     #[test]

@@ -130,10 +130,10 @@ impl Registration {
         let verdicts = vec![Verdict { free_directions: Vec::new(), ..verdict }; poses.len()];
         let mut registration =
             Registration { poses: poses.to_vec(), verdicts, pose_sigma, residual: f64::NAN };
+        let params = RegisterParams::default();
         let samples: Vec<Sample> =
-            scans.iter().map(|s| Sample::new(s, &RegisterParams::default())).collect();
-        registration.residual =
-            joint::residual(&samples, &registration, &RegisterParams::default());
+            scans.iter().map(|scan| Sample::new(scan, pose_sigma, &params)).collect();
+        registration.residual = joint::residual(&samples, &registration, &params);
         registration
     }
 }
@@ -151,25 +151,29 @@ pub fn register(
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    let samples: Vec<Sample> = scans.iter().map(|s| Sample::new(s, params)).collect();
-    register_samples(&samples, robot, pose_sigma, params, progress)
+    if scans.is_empty() || scans.len() != robot.len() {
+        return Err(Error::input(format!(
+            "{} scans with {} poses: each scan needs one pose",
+            scans.len(),
+            robot.len()
+        )));
+    }
+    let samples = |sigma: PoseSigma| -> Vec<Sample> {
+        scans.iter().map(|scan| Sample::new(scan, sigma, params)).collect()
+    };
+    let pose_sigma = pose_sigma.unwrap_or_else(|| {
+        sigma::estimate(&samples(PoseSigma { translation: 0.0, rotation: 0.0 }), robot)
+    });
+    register_samples(&samples(pose_sigma), robot, pose_sigma, params, progress)
 }
 
 fn register_samples(
     samples: &[Sample],
     robot: &[Pose],
-    pose_sigma: Option<PoseSigma>,
+    pose_sigma: PoseSigma,
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
-    if samples.is_empty() || samples.len() != robot.len() {
-        return Err(Error::input(format!(
-            "{} scans with {} poses: each scan needs one pose",
-            samples.len(),
-            robot.len()
-        )));
-    }
-    let pose_sigma = pose_sigma.unwrap_or_else(|| sigma::estimate(samples, robot));
     let mut registration = stages::two_stages(samples, robot, pose_sigma, params, progress)?;
     if params.joint && params.method != Method::Thesis {
         joint::optimise(samples, robot, &mut registration, Start::Coarse, params, progress)?;

@@ -109,18 +109,32 @@ impl<'a> Neighbourhood<'a> {
     }
 }
 
-/// Unit normals towards the sensor, which sees the points along the unit vectors `rays`; none for
-/// points that are off their plane or at grazing incidence. `noise` (metres) is that of most
-/// planes.
-pub(super) fn normals(near: &Neighbourhood, rays: &[Vec3], noise: f64) -> Vec<Option<Vec3>> {
+/// The unit normals of one point, towards the sensor.
+#[derive(Clone, Copy)]
+pub(super) struct PointNormals {
+    /// That of a plane that does not reach round an edge.
+    pub sharp: Vec3,
+    /// That of the plane through all neighbours, which rounds edges off.
+    pub smooth: Vec3,
+}
+
+/// Normals of the points that the sensor sees along the unit vectors `rays`; none for points that
+/// are off their plane or at grazing incidence. `noise` (metres) is that of most planes.
+pub(super) fn normals(
+    near: &Neighbourhood,
+    rays: &[Vec3],
+    noise: f64,
+) -> Vec<Option<PointNormals>> {
     let all = 0..near.points.len();
     let fits: Vec<Option<LocalFit>> = all.clone().into_par_iter().map(|i| near.fit(i)).collect();
     let smooth = smooth_noise(&fits).unwrap_or(noise);
     let normal = |i: usize| {
         let own = fits[i]?;
+        let towards_sensor = |fit: &LocalFit| oriented(fit, &near.points[i], &rays[i], noise);
         let edge = own.noise > MAX_NOISE_RATIO * smooth;
-        let fit = if edge { near.lent(i, &own, &fits, smooth).unwrap_or(own) } else { own };
-        oriented(&fit, &near.points[i], &rays[i], noise)
+        let lent = if edge { near.lent(i, &own, &fits, smooth) } else { None };
+        let sharp = towards_sensor(&lent.unwrap_or(own))?;
+        Some(PointNormals { sharp, smooth: towards_sensor(&own).unwrap_or(sharp) })
     };
     all.into_par_iter().map(normal).collect()
 }

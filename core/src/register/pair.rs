@@ -14,9 +14,9 @@ pub struct PairScan {
 }
 
 impl PairScan {
-    /// Makes a scan ready.
-    pub fn new(scan: &PreparedScan, params: &RegisterParams) -> PairScan {
-        let sample = Sample::new(scan, params);
+    /// Makes a scan ready whose pose is known by `sigma`.
+    pub fn new(scan: &PreparedScan, sigma: PoseSigma, params: &RegisterParams) -> PairScan {
+        let sample = Sample::new(scan, sigma, params);
         let here = Pose::identity();
         let map = Sample::map_of(std::iter::once((&sample, &here)), sample.target_spacing);
         PairScan { sample, map }

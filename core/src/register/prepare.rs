@@ -1,6 +1,6 @@
 //! From a raw scan to oriented points in the sensor frame.
 
-use super::normals::{Neighbourhood, normals};
+use super::normals::{Neighbourhood, PointNormals, normals};
 use crate::geometry::{Cloud, KdTree, NoiseModel, Residual, Scan, Vec3, median};
 use crate::voxel::{CellIndex, most_central};
 use crate::{Error, Result};
@@ -11,8 +11,10 @@ use rayon::prelude::*;
 pub struct PreparedScan {
     /// Points, metres.
     pub points: Vec<Vec3>,
-    /// Unit normals, towards the sensor.
+    /// Unit normals, towards the sensor, of planes that do not reach round edges.
     pub normals: Vec<Vec3>,
+    /// Unit normals, towards the sensor, of the planes through all neighbours: they round edges off.
+    pub smooth_normals: Vec<Vec3>,
     /// Unit vectors along the rays, away from the sensor.
     pub rays: Vec<Vec3>,
     /// Median distance between neighbouring points, metres.
@@ -104,6 +106,7 @@ impl PreparedScan {
         Ok(PreparedScan {
             points: cloud.points.clone(),
             normals: cloud.normals.clone(),
+            smooth_normals: cloud.normals.clone(),
             rays: cloud.normals.iter().map(|n| -n).collect(),
             spacing,
             noise,
@@ -185,7 +188,7 @@ impl Raw {
     }
 
     /// The noise by range and incidence, from distances to planes so small that no curvature counts.
-    fn noise_model(&self, oriented: &[Option<Vec3>], spacing: f64) -> Option<NoiseModel> {
+    fn noise_model(&self, oriented: &[Option<PointNormals>], spacing: f64) -> Option<NoiseModel> {
         let near = Neighbourhood::new(&self.points, SMALL * spacing);
         let stride = oriented.len().div_ceil(RESIDUALS).max(1);
         let some: Vec<usize> = (0..oriented.len()).step_by(stride).collect();
@@ -194,7 +197,7 @@ impl Raw {
             let off = (self.points[i] - fit.center).dot(&fit.normal);
             Some(Residual {
                 range: self.ranges[i],
-                cosine: normal.dot(&self.rays[i]).abs(),
+                cosine: normal.sharp.dot(&self.rays[i]).abs(),
                 // In the middle of its neighbours a point's leverage in their plane is 1 / count.
                 distance: off / (1.0 - 1.0 / fit.count).sqrt(),
             })
@@ -205,18 +208,23 @@ impl Raw {
     }
 
     /// Fills in the points with a normal and those without.
-    fn prepared(&self, oriented: &[Option<Vec3>], mut prepared: PreparedScan) -> PreparedScan {
+    fn prepared(
+        &self,
+        oriented: &[Option<PointNormals>],
+        mut prepared: PreparedScan,
+    ) -> PreparedScan {
         for (i, oriented) in oriented.iter().enumerate() {
             let (point, ray, range, source) =
                 (self.points[i], self.rays[i], self.ranges[i], self.source[i]);
-            let Some(normal) = oriented else {
+            let Some(PointNormals { sharp, smooth }) = oriented else {
                 prepared.aside.push(Unoriented { point, ray, range: range as f32, source });
                 continue;
             };
             prepared.points.push(point);
-            prepared.normals.push(*normal);
+            prepared.normals.push(*sharp);
+            prepared.smooth_normals.push(*smooth);
             prepared.rays.push(ray);
-            prepared.sigma.push(prepared.model.at(range, normal.dot(&ray)) as f32);
+            prepared.sigma.push(prepared.model.at(range, sharp.dot(&ray)) as f32);
             prepared.range.push(range as f32);
             prepared.source.push(source);
         }

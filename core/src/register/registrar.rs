@@ -63,7 +63,7 @@ impl Registrar {
     /// Takes a scan with the robot's pose `object_from_sensor`. Returns the scans whose pose or verdict is new, this
     /// one first; others had been put aside and were placed now.
     pub fn add(&mut self, scan: &PreparedScan, robot: &Pose) -> Vec<usize> {
-        let sample = Sample::new(scan, &self.params);
+        let sample = Sample::new(scan, self.pose_sigma, &self.params);
         let index = self.samples.len();
         self.robot.push(*robot);
         self.poses.push(*robot);
@@ -154,13 +154,8 @@ impl Registrar {
     /// # Errors
     /// As [`super::register`].
     pub fn refine(&mut self, progress: &Progress) -> Result<Registration> {
-        let registration = register_samples(
-            &self.samples,
-            &self.robot,
-            Some(self.pose_sigma),
-            &self.params,
-            progress,
-        )?;
+        let registration =
+            register_samples(&self.samples, &self.robot, self.pose_sigma, &self.params, progress)?;
         self.adopt(&registration);
         Ok(registration)
     }

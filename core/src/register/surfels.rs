@@ -222,13 +222,14 @@ fn patch(points: &[Vec3], normals: &[Vec3], members: &[u32]) -> Option<(Vec3, Ve
 mod tests {
     use super::*;
     use crate::geometry::Scan;
-    use crate::register::{PreparedScan, RegisterParams};
+    use crate::register::{PoseSigma, PreparedScan, RegisterParams};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     const RADIUS: f64 = 0.05;
     const NOISE: f64 = 1.5e-3;
+    const EXACT: PoseSigma = PoseSigma { translation: 0.0, rotation: 0.0 };
 
     /// A ball before a camera 0.5 m away, with noise along the rays and ever fewer points towards its outline.
     fn ball(rng: &mut ChaCha8Rng) -> PreparedScan {
@@ -256,7 +257,7 @@ mod tests {
     #[test]
     fn noise_along_the_rays_does_not_push_the_outline_inwards() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let sample = Sample::new(&ball(&mut rng), &RegisterParams::default());
+        let sample = Sample::new(&ball(&mut rng), EXACT, &RegisterParams::default());
         // The true surface as surfels.
         let center = Vec3::z() * 0.5;
         let normals: Vec<Vec3> = (0..600)

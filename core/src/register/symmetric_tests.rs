@@ -87,6 +87,9 @@ fn eye(tilt: f64) -> Pose {
     Pose::face_towards(&at, &nalgebra::Point3::origin(), &Vec3::x())
 }
 
+/// What the pose of a scan alone is known by.
+const SIGMA: PoseSigma = PoseSigma { translation: SHIFT, rotation: TURN };
+
 /// Covariance of a turn about the point (0, 0, AWAY) of the sensor frame and a shift.
 fn about_the_middle() -> Mat6 {
     let of_middle = Mat6::from_fn(|r, c| {
@@ -118,8 +121,8 @@ fn outcomes(shape: Shape, noise: Noise) -> Vec<Outcome> {
     let one = |seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (there, here) = (eye(-0.15), eye(0.15));
-        let fixed = PairScan::new(&look(shape, noise, &there, &mut rng), &params);
-        let moving = PairScan::new(&look(shape, noise, &here, &mut rng), &params);
+        let fixed = PairScan::new(&look(shape, noise, &there, &mut rng), SIGMA, &params);
+        let moving = PairScan::new(&look(shape, noise, &here, &mut rng), SIGMA, &params);
         let truth = there.inverse() * here;
         let off: Twist = root * Twist::from_fn(|_, _| rng.sample(StandardNormal));
         let guess = truth * exp(&off);
@@ -225,8 +228,8 @@ fn ribs_that_repeat_are_ambiguous_unless_the_prior_tells_them_apart() {
     let params = RegisterParams::default();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (there, here) = (eye(-0.15), eye(0.15));
-    let fixed = PairScan::new(&look(ribs, Noise::Laser, &there, &mut rng), &params);
-    let moving = PairScan::new(&look(ribs, Noise::Laser, &here, &mut rng), &params);
+    let fixed = PairScan::new(&look(ribs, Noise::Laser, &there, &mut rng), SIGMA, &params);
+    let moving = PairScan::new(&look(ribs, Noise::Laser, &here, &mut rng), SIGMA, &params);
     let truth = there.inverse() * here;
     // Along x of the object by a whole rib.
     let guess = there.inverse() * Pose::translation(0.0098, 0.0, 0.0) * here;

@@ -227,7 +227,8 @@ fn scans_that_come_one_by_one_are_placed_put_aside_and_refined_as_all_at_once() 
 fn a_pair_comes_together_whatever_the_order() {
     let case = case(SIGMA);
     let params = RegisterParams::default();
-    let ready: Vec<PairScan> = case.scans.iter().map(|s| PairScan::new(s, &params)).collect();
+    let ready: Vec<PairScan> =
+        case.scans.iter().map(|s| PairScan::new(s, SIGMA, &params)).collect();
     for (moving, fixed) in [(0, 1), (1, 0), (5, 4)] {
         let relative = |poses: &[Pose]| poses[fixed].inverse() * poses[moving];
         let guess = relative(&case.robot);
@@ -287,7 +288,7 @@ fn scans_that_wait_and_fit_each_other_join_together() {
 fn a_scan_at_rest_in_the_wrong_place_is_moved_and_no_other() {
     let case = case(SIGMA);
     let params = RegisterParams::default();
-    let samples: Vec<Sample> = case.scans.iter().map(|s| Sample::new(s, &params)).collect();
+    let samples: Vec<Sample> = case.scans.iter().map(|s| Sample::new(s, SIGMA, &params)).collect();
     let mut registration = Registration::exact(&case.scans, &case.truth);
     registration.pose_sigma = SIGMA;
     for verdict in &mut registration.verdicts {

@@ -55,7 +55,7 @@ mod tests {
         let mut worse = Vec::new();
         for Variant { name, params } in variants(&RegisterParams::default()) {
             let ready: Vec<PairScan> =
-                case.scans[..2].iter().map(|s| PairScan::new(s, &params)).collect();
+                case.scans[..2].iter().map(|s| PairScan::new(s, SIGMA, &params)).collect();
             let guess = case.robot[1].inverse() * case.robot[0];
             let (pose, _) = align_pair(&ready[0], &ready[1], &guess, SIGMA, &params);
             let [before, after] = [guess, pose].map(|p| pair_error(&case, 0, 1, &p));

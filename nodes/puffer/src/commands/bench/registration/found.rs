@@ -132,7 +132,8 @@ fn pairs(
     prepared: &[PreparedScan],
     params: &RegisterParams,
 ) -> Result<Vec<Pair>> {
-    let ready: Vec<PairScan> = prepared.iter().map(|s| PairScan::new(s, params)).collect();
+    let ready: Vec<PairScan> =
+        prepared.iter().map(|scan| PairScan::new(scan, scans.pose_sigma, params)).collect();
     let align = |moving: usize| {
         let fixed = neighbour(scans, moving)?;
         let pose = |i: usize| scans.views[i].reported_pose;
