@@ -98,6 +98,10 @@ fn missing_and_malformed_files() {
     }
     refused(folder, &["evaluate", "none.ply", "--truth", "t.ply"], FAILED, &["none.ply"]);
     refused(folder, &["render", "none.ply", "-o", "p.png"], FAILED, &["none.ply"]);
+    for from in ["1,foo,-1,0.5", "1,2", "1,2,3,", "0,0,0", "1,inf,0", "1,NaN,0"] {
+        let arguments = ["render", "none.ply", "-o", "p.png", "--from", from];
+        refused(folder, &arguments, USAGE, &["--from", from, "1,-1,0.5"]);
+    }
     let whole = ply(&plane());
     fs::write(folder.join("cut.ply"), &whole[..whole.len() / 2]).unwrap();
     fs::write(folder.join("head.ply"), &whole[..40]).unwrap();

@@ -30,8 +30,9 @@ impl Render {
     pub(super) fn run(&self) -> Result<()> {
         check_output(&self.output, &["png"])?;
         let (width, height) = self.pixels()?;
+        let direction = self.direction()?;
         let mesh = read_mesh(&self.mesh)?;
-        let image = match self.direction()? {
+        let image = match direction {
             None => render_sheet(&mesh, width, height),
             Some(eye) => {
                 let up = if eye.x.hypot(eye.y) > 1e-6 * eye.norm() { Vec3::z() } else { Vec3::y() };
@@ -55,9 +56,11 @@ impl Render {
 
     fn direction(&self) -> Result<Option<Vec3>> {
         let Some(text) = &self.from else { return Ok(None) };
-        let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-        match numbers[..] {
-            [x, y, z] if Vec3::new(x, y, z).norm() > 0.0 => Ok(Some(Vec3::new(x, y, z))),
+        let numbers: std::result::Result<Vec<f64>, _> =
+            text.split(',').map(|number| number.trim().parse()).collect();
+        let length = numbers.iter().flatten().map(|number| number * number).sum::<f64>().sqrt();
+        match numbers.as_deref() {
+            Ok(&[x, y, z]) if length.is_finite() && length > 0.0 => Ok(Some(Vec3::new(x, y, z))),
             _ => Err(usage(format!("--from {text}: expected three numbers, as in 1,-1,0.5"))),
         }
     }
