@@ -7,7 +7,6 @@ use puffer_msgs::action::ReconstructMeshGoal;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::Node;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// Offers `~/finish`.
 pub(crate) fn serve(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()> {
@@ -29,13 +28,10 @@ pub(crate) fn serve(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()>
 impl Modeller {
     /// The last three commands of a session; the mesh's path.
     async fn finish(&self) -> Result<String> {
-        if self.is_busy() {
+        let Some(_claim) = self.busy.claim() else {
             bail!("an object is being modelled: cancel that, or let it come to its end");
-        }
-        self.finishing.store(true, Ordering::SeqCst);
-        let path = self.refine_filter_reconstruct().await;
-        self.finishing.store(false, Ordering::SeqCst);
-        path
+        };
+        self.refine_filter_reconstruct().await
     }
 
     async fn refine_filter_reconstruct(&self) -> Result<String> {

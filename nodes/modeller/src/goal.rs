@@ -1,11 +1,11 @@
 //! The action `model_object`.
 
 use crate::Params;
+use crate::busy::Busy;
 use crate::inbox::Inbox;
 use crate::journal::Journal;
 use crate::partners::Partners;
 use crate::runner::{End, Runner, phase_constant};
-use anyhow::Result;
 use puffer_core::geometry::Aabb;
 use puffer_core::session::{Event, Outcome as Ended, Phase, SessionParams, State};
 use puffer_msgs::action::{
@@ -17,7 +17,6 @@ use puffer_msgs::srv::ReconstructResponse;
 use puffer_msgs::std_msgs::msg::Header;
 use puffer_shell::convert::region_from_message;
 use puffer_shell::{Goal, Node, Outcome, Publisher};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
@@ -30,8 +29,15 @@ pub(crate) struct Modeller {
     pub status: Publisher<ModellingStatus>,
     /// Where the running session takes its controls.
     pub controls: Mutex<Option<UnboundedSender<Event>>>,
-    /// Whether scans that were taken before are being made into a mesh.
-    pub finishing: AtomicBool,
+    /// Whether a session is running, or its last steps alone.
+    pub busy: Busy,
+}
+
+/// Why there was no session, or no report of it.
+struct Fault {
+    /// A constant of [`ModelObjectResult`].
+    error_code: u16,
+    error: anyhow::Error,
 }
 
 impl Modeller {
@@ -39,15 +45,6 @@ impl Modeller {
     pub(crate) fn control(&self, event: Event) -> bool {
         let controls = self.controls.lock().unwrap_or_else(PoisonError::into_inner);
         controls.as_ref().is_some_and(|sender| sender.send(event).is_ok())
-    }
-
-    /// Whether a session is running, or its last steps alone.
-    pub(crate) fn is_busy(&self) -> bool {
-        if self.finishing.load(Ordering::SeqCst) {
-            return true;
-        }
-        let controls = self.controls.lock().unwrap_or_else(PoisonError::into_inner);
-        controls.as_ref().is_some_and(|sender| !sender.is_closed())
     }
 
     pub(crate) async fn model(&self, goal: Goal<ModelObject>) -> Outcome<ModelObjectResult> {
@@ -65,7 +62,7 @@ impl Modeller {
         let told = |state: &State, message: &str| self.tell(&goal, state, message, since);
         let outcome = match self.run(&goal, controls, told).await {
             Ok((end, result)) => finished(end, result),
-            Err(error) => failed(ModelObjectResult::NO_DRIVER, format!("{error:#}")),
+            Err(Fault { error_code, error }) => failed(error_code, format!("{error:#}")),
         };
         watch.abort();
         *self.controls.lock().unwrap_or_else(PoisonError::into_inner) = None;
@@ -77,25 +74,22 @@ impl Modeller {
         goal: &Goal<ModelObject>,
         controls: tokio::sync::mpsc::UnboundedReceiver<Event>,
         told: impl FnMut(&State, &str),
-    ) -> Result<(End, ModelObjectResult)> {
+    ) -> Result<(End, ModelObjectResult), Fault> {
         let since = Instant::now();
         let params = self.node.params();
-        let ready = async {
-            self.partners.ready().await?;
-            self.partners.reset().await
-        };
         // Whoever asks to end while partners are awaited is heard at once.
         tokio::select! {
-            ready = ready => ready?,
+            ready = self.ready() => ready?,
             () = goal.cancelled() => {}
         }
         self.inbox.clear();
-        let journal = Journal::begin(&params, self.node.now())?;
+        let run_folder = |error| Fault { error_code: ModelObjectResult::RUN_FOLDER, error };
+        let journal = Journal::begin(&params, self.node.now()).map_err(run_folder)?;
         let asked = goal.request().clone();
         let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, asked);
         let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
         let end = runner.run(session(&params, goal.request()), first, controls, told).await;
-        runner.report(&end)?;
+        runner.report(&end).map_err(run_folder)?;
         let mesh = &runner.mesh;
         let verdict = runner.verdict_on_all(&end);
         let share = |share: Option<f64>| share.map_or(f32::NAN, |share| share as f32);
@@ -120,6 +114,20 @@ impl Modeller {
             share_of_cells_explained: share(verdict.cells_explained),
         };
         Ok((end, result))
+    }
+
+    /// Waits until all partners are there and have forgotten earlier scans.
+    async fn ready(&self) -> Result<(), Fault> {
+        self.partners.ready().await.map_err(|error| {
+            let driver_missing = !self.partners.has_driver();
+            let error_code = match driver_missing {
+                true => ModelObjectResult::NO_DRIVER,
+                false => ModelObjectResult::NODE_MISSING,
+            };
+            Fault { error_code, error }
+        })?;
+        let silent = |error| Fault { error_code: ModelObjectResult::NODE_MISSING, error };
+        self.partners.reset().await.map_err(silent)
     }
 
     fn tell(&self, goal: &Goal<ModelObject>, state: &State, message: &str, since: Instant) {

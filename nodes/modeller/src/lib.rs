@@ -5,6 +5,7 @@
 //! `~/resume` and the action's cancel steer it. `~/finish` does the last three steps alone. The order itself is
 //! [`puffer_core::session`].
 
+mod busy;
 mod finish;
 mod goal;
 mod inbox;
@@ -16,6 +17,7 @@ mod runner;
 pub use params::{ModellerParams, Noise, Params};
 
 use anyhow::Result;
+use busy::{Busy, Claim};
 use goal::Modeller;
 use inbox::Inbox;
 use partners::Partners;
@@ -25,8 +27,7 @@ use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
 use puffer_shell::bulk::{BulkSubscription, Delivery};
 use puffer_shell::{Goal, Node, Profile, RosArgs, Stop};
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Runs the modeller until `stop`.
 ///
@@ -41,7 +42,7 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
         inbox: Arc::new(Inbox::default()),
         status: node.publisher("modelling_status", Profile::Standard)?,
         controls: Mutex::new(None),
-        finishing: AtomicBool::new(false),
+        busy: Busy::default(),
         node: node.clone(),
     });
     serve_goals(&node, &modeller)?;
@@ -57,27 +58,33 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
         }
     }
     // A running session writes its report before the node goes.
-    while modeller.is_busy() {
+    while modeller.busy.is_claimed() {
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
     }
     Ok(())
 }
 
 fn serve_goals(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()> {
-    let (asked, modeller) = (Arc::clone(modeller), Arc::clone(modeller));
+    let modeller = Arc::clone(modeller);
+    let busy = modeller.busy.clone();
+    // From the acceptance of a goal until its work takes it over.
+    let claimed: Arc<Mutex<Option<Claim>>> = Arc::default();
+    let taken = Arc::clone(&claimed);
     node.action_server::<ModelObject, _, _, _>(
         "model_object",
         move |goal: &ModelObjectGoal| {
             goal::check(goal)?;
-            if asked.is_busy() {
-                Err("another object is being modelled".to_owned())
-            } else {
-                Ok(())
-            }
+            let claim = busy.claim().ok_or("another object is being modelled")?;
+            *claimed.lock().unwrap_or_else(PoisonError::into_inner) = Some(claim);
+            Ok(())
         },
         move |goal: Goal<ModelObject>| {
             let modeller = Arc::clone(&modeller);
-            async move { modeller.model(goal).await }
+            let claim = taken.lock().unwrap_or_else(PoisonError::into_inner).take();
+            async move {
+                let _claim = claim;
+                modeller.model(goal).await
+            }
         },
     )
 }

@@ -67,6 +67,11 @@ impl Partners {
         .await
     }
 
+    /// Whether robot and sensor are there.
+    pub(crate) fn has_driver(&self) -> bool {
+        self.drive.is_ready() && self.trigger.is_ready()
+    }
+
     /// Waits until those are there that make a mesh of scans that were taken.
     ///
     /// # Errors
