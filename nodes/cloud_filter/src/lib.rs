@@ -122,12 +122,12 @@ async fn combine(
     clouds: &BulkPublisher,
 ) -> Result<FilterResponse> {
     let params = node.params().filter;
-    let filtered = {
+    let (filtered, frame_id) = {
         let store = store.lock().await;
-        tokio::task::block_in_place(|| store.filter(&params))?
+        (tokio::task::block_in_place(|| store.filter(&params))?, store.frame.clone())
     };
     let (sec, nanosec) = node.now().parts();
-    let header = Header { stamp: Time { sec, nanosec }, frame_id: "object".to_owned() };
+    let header = Header { stamp: Time { sec, nanosec }, frame_id };
     clouds.publish_message(&cloud_message(&filtered.cloud, header)).await?;
     tracing::info!("{} points of {} measurements", filtered.cloud.len(), filtered.measurements);
     Ok(FilterResponse {

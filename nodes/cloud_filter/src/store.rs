@@ -17,6 +17,8 @@ pub(crate) struct Store {
     residual: Option<f64>,
     /// The newest corrected poses.
     poses: Option<RegisteredPoses>,
+    /// The frame that the scans are registered in.
+    pub frame: String,
 }
 
 struct Held {
@@ -50,6 +52,7 @@ impl Store {
             version: message.version,
         };
         self.scans.insert(message.id, held);
+        self.frame.clone_from(&message.header.frame_id);
         Ok(())
     }
 
@@ -135,10 +138,12 @@ mod tests {
         let mut store = Store::default();
         let scan = |version: u32, status: u8| {
             let cloud = scan_message(&Scan::default(), Header::default());
-            RegisteredScan { version, status, cloud, ..RegisteredScan::default() }
+            let header = Header { frame_id: "workpiece".to_owned(), ..Header::default() };
+            RegisteredScan { header, version, status, cloud, ..RegisteredScan::default() }
         };
         store.take(&scan(2, RegisteredScan::ACCEPTED)).unwrap();
         store.take(&scan(1, RegisteredScan::DEFERRED)).unwrap();
+        assert_eq!(store.frame, "workpiece");
         assert_eq!((store.scans[&0].version, store.scans[&0].status), (2, Status::Accepted));
         store.take(&scan(3, RegisteredScan::REFUSED)).unwrap();
         assert_eq!((store.len(), store.scans[&0].status), (1, Status::Refused));

@@ -14,6 +14,8 @@ use puffer_core::view::{Plan, ReachedView, RefusedView, State, ViewParams, ViewS
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::PlanViewRequest;
+use puffer_msgs::std_msgs::msg::Header;
+use puffer_shell::Stamp;
 use puffer_shell::convert::{
     pose_from_message, region_from_message, scan_from_message, status_from_message,
 };
@@ -48,6 +50,8 @@ pub(crate) struct Desk {
     revision: u32,
     /// What the space was made for.
     aim: Aim,
+    /// The frame that the scans are registered in.
+    frame: String,
 }
 
 /// A body and its pose `shape_from_object`.
@@ -98,6 +102,7 @@ impl Desk {
             planned: Vec::new(),
             revision: 0,
             aim,
+            frame: OBJECT_FRAME.to_owned(),
         })
     }
 
@@ -115,6 +120,11 @@ impl Desk {
     /// What the space knows.
     pub(crate) fn space(&self) -> &ViewSpace {
         &self.space
+    }
+
+    /// The header of what is told of the space: its frame is that of the scans, once one came.
+    pub(crate) fn header(&self, stamp: Stamp) -> Header {
+        Header { stamp: stamp.into(), frame_id: self.frame.clone() }
     }
 
     /// What a request asks views for.
@@ -206,6 +216,7 @@ impl Desk {
                 .map_err(anyhow::Error::msg)?,
             status: status_from_message(message.status).map_err(anyhow::Error::msg)?,
         };
+        self.frame.clone_from(&message.header.frame_id);
         let accepted = held.status == Status::Accepted;
         self.scans.insert(message.id, held);
         // The next one is taken in at once, so that a plan need not wait for it; whether it is what the plan is to

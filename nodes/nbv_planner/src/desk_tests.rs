@@ -68,6 +68,17 @@ fn scans(count: usize) -> Vec<RegisteredScan> {
     above.take(count).enumerate().map(told).collect()
 }
 
+#[test]
+fn what_is_told_of_the_space_bears_the_frame_of_the_scans() {
+    let mut scan = with(&scans(1)[0], 1, Status::Accepted);
+    scan.header.frame_id = "workpiece".to_owned();
+    let mut desk = desk();
+    assert_eq!(desk.header(Stamp::new(7, 8)).frame_id, "object");
+    desk.take(&scan).unwrap();
+    let header = desk.header(Stamp::new(7, 8));
+    assert_eq!((header.frame_id.as_str(), header.stamp.sec), ("workpiece", 7));
+}
+
 fn header() -> Header {
     Header { frame_id: SENSOR_FRAME.to_owned(), ..Header::default() }
 }

@@ -55,7 +55,7 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
                     let scan = scan?;
                     let mut desk = desk.lock().await;
                     tokio::task::block_in_place(|| desk.take(&scan))?;
-                    markers.show_space(desk.space(), node.now());
+                    markers.show_space(desk.space(), desk.header(node.now()));
                     Ok(())
                 }
                 poses = poses.next() => desk.lock().await.correct(&poses?),
@@ -91,8 +91,8 @@ fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>, markers: &Arc<Marke
             let since = Instant::now();
             match tokio::task::block_in_place(|| desk.plan(&request)) {
                 Ok(planned) => {
-                    markers.show_space(desk.space(), node.now());
-                    markers.show_plan(&planned.plan, node.now());
+                    markers.show_space(desk.space(), desk.header(node.now()));
+                    markers.show_plan(&planned.plan, &desk.header(node.now()));
                     let response = answer::response(&planned, &desk.joint_names());
                     tracing::info!(
                         "{} in {:.2} s: gain {:.0}, coverage {:.1} %{}",

@@ -3,13 +3,12 @@
 use crate::Params;
 use anyhow::Result;
 use puffer_core::geometry::{Pose, Vec3};
-use puffer_core::robot::OBJECT_FRAME;
 use puffer_core::view::{Plan, State, ViewSpace};
 use puffer_msgs::geometry_msgs::msg::Vector3;
 use puffer_msgs::std_msgs::msg::{ColorRGBA, Header};
 use puffer_msgs::visualization_msgs::msg::{Marker, MarkerArray};
 use puffer_shell::convert::point_message;
-use puffer_shell::{Node, Profile, Publisher, Stamp};
+use puffer_shell::{Node, Profile, Publisher};
 
 /// Voxels shown at most: at 40 bytes each they fit the socket buffers of a stock machine (212992 bytes).
 const MOST_VOXELS: usize = 5000;
@@ -44,15 +43,15 @@ impl Markers {
         Ok(Markers { voxels, candidates })
     }
 
-    pub(crate) fn show_space(&self, space: &ViewSpace, now: Stamp) {
+    pub(crate) fn show_space(&self, space: &ViewSpace, header: Header) {
         if self.voxels.readers() > 0 {
-            tell(self.voxels.publish(&voxels(&space.voxels(), space.edge(), header(now))));
+            tell(self.voxels.publish(&voxels(&space.voxels(), space.edge(), header)));
         }
     }
 
-    pub(crate) fn show_plan(&self, plan: &Plan, now: Stamp) {
+    pub(crate) fn show_plan(&self, plan: &Plan, header: &Header) {
         if self.candidates.readers() > 0 {
-            tell(self.candidates.publish(&candidates(plan, &header(now))));
+            tell(self.candidates.publish(&candidates(plan, header)));
         }
     }
 }
@@ -62,10 +61,6 @@ fn tell(published: Result<()>) {
     if let Err(error) = published {
         tracing::debug!("{error:#}");
     }
-}
-
-fn header(now: Stamp) -> Header {
-    Header { stamp: now.into(), frame_id: OBJECT_FRAME.to_owned() }
 }
 
 /// Surface and possible border voxels as cubes; evenly thinned out where they are too many.
@@ -146,6 +141,10 @@ fn upright() -> Marker {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn header() -> Header {
+        Header { frame_id: "workpiece".to_owned(), ..Header::default() }
+    }
     use puffer_core::view::{Candidate, ChosenView, Counts};
 
     #[test]
@@ -158,13 +157,16 @@ mod tests {
             (at(3), State::PossibleInside, false),
             (at(4), State::Excluded, false),
         ];
-        let marker = voxels(&space, 0.004, header(Stamp::new(7, 8)));
-        assert_eq!((marker.r#type, marker.header.frame_id.as_str()), (Marker::CUBE_LIST, "object"));
+        let marker = voxels(&space, 0.004, header());
+        assert_eq!(
+            (marker.r#type, marker.header.frame_id.as_str()),
+            (Marker::CUBE_LIST, "workpiece")
+        );
         assert_eq!((marker.scale.x, marker.pose.orientation.w), (0.004, 1.0));
         assert_eq!(marker.colors, [SATISFIED, LACKING, BORDER]);
         assert_eq!(marker.points[2].x, 0.02);
         let many: Vec<_> = (0..12_001).map(|k| (at(k), State::Occupied, true)).collect();
-        let marker = voxels(&many, 0.004, header(Stamp::default()));
+        let marker = voxels(&many, 0.004, header());
         assert_eq!((marker.points.len(), marker.colors.len()), (4001, 4001));
         assert_eq!(marker.points[4000].x, 120.0, "evenly thinned out, to the last");
         let bytes = puffer_msgs::cdr::to_bytes(&marker).unwrap().len();
@@ -203,7 +205,7 @@ mod tests {
             counts: Counts::default(),
             done: None,
         };
-        let markers = candidates(&plan, &header(Stamp::default())).markers;
+        let markers = candidates(&plan, &header()).markers;
         let (clear, arrows) = markers.split_first().unwrap();
         assert_eq!(clear.action, Marker::DELETEALL);
         let colours: Vec<_> = arrows.iter().map(|a| (a.id, a.color)).collect();

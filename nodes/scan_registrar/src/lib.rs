@@ -73,14 +73,12 @@ impl Desk {
             Ok(observation) => tokio::task::block_in_place(|| intake.add(observation)),
             Err(error) => {
                 let stamp = Stamp::new(cloud.header.stamp.sec, cloud.header.stamp.nanosec);
-                vec![intake.add_unusable(stamp, format!("{error:#}"))]
+                vec![intake.add_unusable(stamp, &cloud.header.frame_id, format!("{error:#}"))]
             }
         };
         let object = self.node.params().scan.object_frame;
-        let messages: Vec<RegisteredScan> = changed
-            .into_iter()
-            .map(|id| messages::scan(id, &intake, &object, &cloud.header.frame_id))
-            .collect();
+        let messages: Vec<RegisteredScan> =
+            changed.into_iter().map(|id| messages::scan(id, &intake, &object)).collect();
         drop(intake);
         for message in messages {
             self.publish(&message).await?;

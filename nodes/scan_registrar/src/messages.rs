@@ -14,8 +14,8 @@ fn header(stamp: Stamp, frame: &str) -> Header {
     Header { stamp: Time { sec, nanosec }, frame_id: frame.to_owned() }
 }
 
-/// Scan `id` as it stands, seen by a sensor with the frame `sensor`.
-pub(crate) fn scan(id: usize, intake: &Intake, object: &str, sensor: &str) -> RegisteredScan {
+/// Scan `id` as it stands, in the frame `object`.
+pub(crate) fn scan(id: usize, intake: &Intake, object: &str) -> RegisteredScan {
     let scan = intake.scan(id);
     let (accepted, accepted_versions) = intake.accepted();
     let verdict = scan.verdict;
@@ -25,8 +25,8 @@ pub(crate) fn scan(id: usize, intake: &Intake, object: &str, sensor: &str) -> Re
         header: header(scan.stamp, object),
         id: id as u32,
         version: scan.version,
-        cloud: scan_message(scan.scan, header(scan.stamp, sensor)),
-        beyond: scan_message(scan.beyond, header(scan.stamp, sensor)),
+        cloud: scan_message(scan.scan, header(scan.stamp, scan.frame)),
+        beyond: scan_message(scan.beyond, header(scan.stamp, scan.frame)),
         object_from_sensor: pose_with_covariance(&scan.pose, &covariance),
         prior: pose_message(&scan.prior),
         status: status_message(scan.status()),
@@ -63,5 +63,21 @@ pub(crate) fn poses(
             .map(|(pose, verdict)| pose_with_covariance(pose, &verdict.covariance))
             .collect(),
         residual: registration.residual,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use puffer_shell::scans::RegistrarParams;
+
+    #[test]
+    fn a_scan_bears_the_frame_of_the_driver_and_the_object_s_as_it_is_configured() {
+        let mut intake = Intake::new(RegistrarParams::default());
+        let id = intake.add_unusable(Stamp::new(7, 8), "zivid_optical", "no transform".to_owned());
+        let message = scan(id, &intake, "workpiece");
+        assert_eq!(message.header.frame_id, "workpiece");
+        assert_eq!(message.cloud.header.frame_id, "zivid_optical");
+        assert_eq!(message.beyond.header.frame_id, "zivid_optical");
     }
 }

@@ -3,7 +3,6 @@
 use crate::{Params, messages};
 use anyhow::Result;
 use puffer_core::register::Status;
-use puffer_core::robot::SENSOR_FRAME;
 use puffer_core::{Error, Progress};
 use puffer_msgs::action::{Refine, RefineFeedback, RefineGoal, RefineResult};
 use puffer_msgs::msg::RegisteredScan;
@@ -85,11 +84,8 @@ impl Desk {
         let object = self.node.params().scan.object_frame;
         let message = messages::poses(&intake, &registration, revision, self.node.now(), &object);
         // Their points have changed with the poses.
-        let scans: Vec<RegisteredScan> = intake
-            .usable()
-            .into_iter()
-            .map(|id| messages::scan(id, &intake, &object, SENSOR_FRAME))
-            .collect();
+        let scans: Vec<RegisteredScan> =
+            intake.usable().into_iter().map(|id| messages::scan(id, &intake, &object)).collect();
         drop(intake);
         for scan in &scans {
             if let Err(error) = self.scans.publish_message(scan).await {

@@ -33,6 +33,8 @@ pub struct Registered<'a> {
     pub version: u32,
     /// When it was taken.
     pub stamp: Stamp,
+    /// The sensor's frame.
+    pub frame: &'a str,
     /// What counts as the object, sensor frame.
     pub scan: &'a Scan,
     /// Some of what does not, sensor frame.
@@ -105,9 +107,9 @@ impl Intake {
         ids
     }
 
-    /// Counts a scan that cannot be used, and why; its number.
-    pub fn add_unusable(&mut self, stamp: Stamp, reason: String) -> usize {
-        let observation = Observation::nothing(stamp);
+    /// Counts a scan of the sensor `frame` that cannot be used, and why; its number.
+    pub fn add_unusable(&mut self, stamp: Stamp, frame: &str, reason: String) -> usize {
+        let observation = Observation::nothing(stamp, frame);
         let (cut, place) = (Cut::default(), Err(reason));
         let version = self.versions_before + 1;
         self.entries.push(Entry { observation, cut, place, version });
@@ -140,9 +142,10 @@ impl Intake {
             Err(reason) => (observation.prior, None, reason.as_str()),
         };
         let (stamp, prior) = (observation.stamp, observation.prior);
+        let frame = observation.frame.as_str();
         let Cut { object, beyond } = &entry.cut;
         let version = entry.version;
-        Registered { version, stamp, scan: object, beyond, prior, pose, verdict, reason }
+        Registered { version, stamp, frame, scan: object, beyond, prior, pose, verdict, reason }
     }
 
     /// The numbers of the scans that are accepted, ascending, and the version of each.
@@ -210,7 +213,7 @@ mod tests {
     fn a_restart_forgets_the_scans_but_not_the_versions() {
         let mut intake = Intake::new(RegistrarParams::default());
         let add = |intake: &mut Intake| {
-            let id = intake.add_unusable(Stamp::default(), "no transform".to_owned());
+            let id = intake.add_unusable(Stamp::default(), "camera", "no transform".to_owned());
             (id, intake.scan(id).version)
         };
         assert_eq!([add(&mut intake), add(&mut intake)], [(0, 1), (1, 1)]);

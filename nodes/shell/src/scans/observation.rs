@@ -16,6 +16,8 @@ const CAUTION: f64 = 2.0;
 pub struct Observation {
     /// When.
     pub stamp: Stamp,
+    /// The sensor's frame, as the driver calls it.
+    pub frame: String,
     /// Returns within the region of interest, sensor frame.
     scan: Scan,
     /// Some of those outside.
@@ -60,13 +62,15 @@ impl Observation {
             scan.point(i).is_some_and(|p| inside(&(prior * Point3::from(p)).coords))
         });
         let (inside, outside) = (select(&scan, &kept), thinned(&select(&scan, &rest)));
-        Ok(Observation { stamp, scan: inside, outside, prior, bodies })
+        let frame = cloud.header.frame_id.clone();
+        Ok(Observation { stamp, frame, scan: inside, outside, prior, bodies })
     }
 
     /// In place of a scan that cannot be used.
-    pub(super) fn nothing(stamp: Stamp) -> Observation {
+    pub(super) fn nothing(stamp: Stamp, frame: &str) -> Observation {
         let (prior, bodies) = (Pose::identity(), Vec::new());
-        Observation { stamp, scan: Scan::default(), outside: Scan::default(), prior, bodies }
+        let (frame, scan, outside) = (frame.to_owned(), Scan::default(), Scan::default());
+        Observation { stamp, frame, scan, outside, prior, bodies }
     }
 
     /// The points that surely are not on a body while the pose is only what the robot says.
