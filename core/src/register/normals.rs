@@ -23,9 +23,10 @@ const SMOOTH_SHARE: f64 = 0.25;
 /// A plane that is noisier than smooth ones by this factor may reach round an edge. The noise of a
 /// plane through thirty points is known to an eighth.
 const MAX_NOISE_RATIO: f64 = 2.0;
-/// A neighbour's plane must be less noisy by this factor: of thirty planes through one bent surface
-/// the least noisy is by a third, by chance, and none of them is better.
-const MIN_GAIN: f64 = 1.5;
+/// A neighbour's plane must be less noisy by this factor. Where a bent surface turns away from the
+/// sensor, noise grows from one plane to the next by less, and the less noisy one is no better: it
+/// is that of another place. At an edge it grows tenfold.
+const MIN_GAIN: f64 = 3.0;
 /// Standard deviations within which a plane of a neighbour holds a point: all but one in 400 of its
 /// own.
 const MAX_LENT_DISTANCE: f64 = 3.0;
