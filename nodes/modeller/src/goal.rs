@@ -119,10 +119,10 @@ impl Modeller {
     /// Waits until all partners are there and have forgotten earlier scans.
     async fn ready(&self) -> Result<(), Fault> {
         self.partners.ready().await.map_err(|error| {
-            let driver_missing = !self.partners.has_driver();
-            let error_code = match driver_missing {
-                true => ModelObjectResult::NO_DRIVER,
-                false => ModelObjectResult::NODE_MISSING,
+            let error_code = if self.partners.has_driver() {
+                ModelObjectResult::NODE_MISSING
+            } else {
+                ModelObjectResult::NO_DRIVER
             };
             Fault { error_code, error }
         })?;
