@@ -1,10 +1,11 @@
-//! Makes Rust types from the interface files: our own in msg, srv and action, others' in standard.
+//! Makes Rust types from the interface files: those of this package in msg, srv and action, and
+//! those of other packages in standard.
 
 use puffer_msgs_generator::{Package, generate};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// A package for tests only.
+/// Folder of a package for tests only.
 const KINDS: &str = "tests/kinds";
 
 fn main() -> ExitCode {
@@ -36,12 +37,15 @@ fn write_code(packages: &[Package], file: &Path) -> Result<(), String> {
 /// This package, and each folder of `standard`.
 fn packages() -> Result<Vec<Package>, String> {
     let mut packages = vec![Package { name: "puffer_msgs".into(), folder: PathBuf::from(".") }];
-    let failed = |e: std::io::Error| format!("cannot read the folder standard: {e}");
-    for entry in std::fs::read_dir("standard").map_err(failed)? {
-        let entry = entry.map_err(failed)?;
+    for entry in std::fs::read_dir("standard").map_err(read_error)? {
+        let entry = entry.map_err(read_error)?;
         let name = entry.file_name().to_string_lossy().into_owned();
         packages.push(Package { name, folder: entry.path() });
     }
     packages.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(packages)
+}
+
+fn read_error(error: std::io::Error) -> String {
+    format!("cannot read the folder standard: {error}")
 }

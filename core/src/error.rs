@@ -1,5 +1,5 @@
-//! The errors of this crate: broken input and I/O. An outcome (an alignment that did not converge, a view
-//! without gain) is a value, never an error.
+//! The errors of this crate: broken input and I/O. An outcome (an alignment that did not converge,
+//! a view without gain) is a value, never an error.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An I/O error with the action ("read", "write", "create") and the path that it befell.
+    /// An I/O error with the action ("read", "write", "create") and the path that it concerns.
     pub fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
         Error::Io { action, path: path.to_path_buf(), source }
     }

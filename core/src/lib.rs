@@ -1,7 +1,7 @@
 //! Every algorithm of puffer, without ROS, clock or printing.
 //!
-//! A module may use only the modules that stand above it in this list; a test checks that. Lengths are
-//! metres, angles radians, and transforms are named `a_from_b`.
+//! A module may use only the modules that stand above it in this list; a test checks that. Lengths
+//! are metres, angles radians, and transforms are named `a_from_b`.
 
 pub mod error;
 pub mod params;
@@ -9,12 +9,16 @@ pub mod progress;
 
 pub mod geometry;
 pub mod mesh;
-pub mod scans;
 pub mod voxel;
+
+pub mod scan;
+pub mod scan_files;
 
 pub mod robot;
 
 pub mod register;
+
+pub mod intake;
 
 pub mod filter;
 
@@ -25,6 +29,8 @@ pub mod verdict;
 pub mod pipeline;
 
 pub mod view;
+
+pub mod planner;
 
 pub mod session;
 

@@ -1,15 +1,34 @@
-//! Parameters with one source: default, range, unit and description stand on the struct field, and the
-//! YAML, the `--help` texts and the reference table are made from them.
+//! Parameters with one source: default, range, unit and description are written at the struct
+//! field, and the YAML, the `--help` texts and the reference table are made from them.
+//!
+//! ```
+//! use puffer_core::params::Value;
+//!
+//! puffer_core::params! {
+//!     /// How a gripper closes.
+//!     pub struct GripperParams("gripper") {
+//!         /// Largest force of the jaws.
+//!         max_force: f64 = 20.0, in [0.0, 100.0], unit "N";
+//!     }
+//! }
+//!
+//! let mut gripper = GripperParams::default();
+//! gripper.set("max_force", &Value::from(35.0))?;
+//! assert_eq!(gripper.max_force, 35.0);
+//! assert!(gripper.set("max_force", &Value::from(200.0)).is_err());
+//! assert_eq!(GripperParams::specs()[0].description, "Largest force of the jaws.");
+//! # Ok::<(), puffer_core::Error>(())
+//! ```
 
 use crate::{Error, Result};
 pub use serde_json::Value;
 
-/// What is known of one parameter.
+/// The declaration of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamSpec {
     /// Full name, `group.field`.
     pub name: String,
-    /// "float", "integer", "boolean", "string" or "choice".
+    /// The type: "float", "integer", "boolean", "string" or "choice".
     pub kind: &'static str,
     /// Value when the user gives none.
     pub default: Value,
@@ -19,7 +38,7 @@ pub struct ParamSpec {
     pub choices: &'static [&'static str],
     /// SI unit, empty if there is none.
     pub unit: &'static str,
-    /// One sentence.
+    /// What the parameter is, in whole sentences.
     pub description: String,
 }
 
@@ -33,7 +52,7 @@ pub trait ParamValue: Sized {
     fn to_value(&self) -> Value;
     /// Reads the value; `None` if the JSON has another type or the word is not among the choices.
     fn from_value(value: &Value) -> Option<Self>;
-    /// The value as a number, to be held against the range.
+    /// The value as a number that is compared with the range; `None` if it is not a number.
     fn as_number(&self) -> Option<f64> {
         None
     }
@@ -75,15 +94,16 @@ impl ParamValue for bool {
     }
 }
 
-/// A set of parameters by full name, `group.field`: one group of [`params!`](crate::params!), or several under
-/// [`param_groups!`](crate::param_groups!).
+/// A set of parameters by full name, `group.field`: one group of [`params!`](crate::params!), or
+/// several under [`param_groups!`](crate::param_groups!).
 pub trait Parameters: Clone + Default + Send + Sync + 'static {
-    /// What is known of each parameter, in the order of declaration.
+    /// The declarations of the parameters, in their order.
     fn all_specs() -> Vec<ParamSpec>;
     /// Sets the parameter `group.field`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there is none of that name, or the value has the wrong type or is out of range.
+    /// [`Error::Parameter`] if there is none of that name, or the value has the wrong type or is
+    /// out of range.
     fn set_named(&mut self, group: &str, field: &str, value: &Value) -> Result<()>;
     /// The values with their full names, in the order of declaration.
     fn all_values(&self) -> Vec<(String, Value)>;
@@ -93,19 +113,21 @@ pub trait Parameters: Clone + Default + Send + Sync + 'static {
     /// # Errors
     /// As [`Parameters::set_named`], and [`Error::Parameter`] for what is no map.
     fn set_all(&mut self, document: &Value) -> Result<()> {
-        let map = |value: &Value, name: &str| {
-            value.as_object().cloned().ok_or_else(|| Error::Parameter {
-                name: name.to_owned(),
-                message: format!("is {value}; expected a map such as `{name}: {{field: value}}`"),
-            })
-        };
-        for (group, fields) in map(document, "parameters")? {
-            for (field, value) in map(&fields, &group)? {
-                self.set_named(&group, &field, &value)?;
+        for (group, fields) in as_map(document, "parameters")? {
+            for (field, value) in as_map(fields, group)? {
+                self.set_named(group, field, value)?;
             }
         }
         Ok(())
     }
+}
+
+/// The map `value`, called `name` in the error if it is none.
+fn as_map<'a>(value: &'a Value, name: &str) -> Result<&'a serde_json::Map<String, Value>> {
+    value.as_object().ok_or_else(|| Error::Parameter {
+        name: name.to_owned(),
+        message: format!("is {value}; expected a map such as `{name}: {{field: value}}`"),
+    })
 }
 
 impl ParamValue for String {
@@ -123,17 +145,18 @@ impl ParamValue for String {
 /// # Errors
 /// [`Error::Parameter`] if the type is wrong or the value out of range.
 pub fn read_field<T: ParamValue>(name: &str, value: &Value, range: Option<[f64; 2]>) -> Result<T> {
-    let parameter = |message: String| Error::Parameter { name: name.to_owned(), message };
     let parsed = T::from_value(value).ok_or_else(|| {
-        parameter(match T::CHOICES {
+        let message = match T::CHOICES {
             [] => format!("{value} is not of type {}", T::KIND),
             choices => format!("{value} is not one of {}", choices.join(", ")),
-        })
+        };
+        Error::Parameter { name: name.to_owned(), message }
     })?;
     if let (Some([low, high]), Some(number)) = (range, parsed.as_number())
         && !(low..=high).contains(&number)
     {
-        return Err(parameter(format!("{number} is out of range; allowed are {low} to {high}")));
+        let message = format!("{number} is out of range; allowed are {low} to {high}");
+        return Err(Error::Parameter { name: name.to_owned(), message });
     }
     Ok(parsed)
 }
@@ -159,8 +182,8 @@ macro_rules! choice {
     };
 }
 
-/// Declares a struct of parameter groups, each a struct of [`params!`](crate::params!), that implements
-/// [`Parameters`](crate::params::Parameters).
+/// Declares a struct of parameter groups, each a struct of [`params!`](crate::params!), that
+/// implements [`Parameters`](crate::params::Parameters).
 #[macro_export]
 macro_rules! param_groups {
     ($(#[$meta:meta])* pub struct $name:ident { $($(#[doc = $doc:literal])* $field:ident: $type:ty,)* }) => {
@@ -197,7 +220,7 @@ macro_rules! param_groups {
     };
 }
 
-/// Declares a parameter struct; each field bears its default, range, unit and description.
+/// Declares a parameter struct; each field has a default, range, unit and description.
 #[macro_export]
 macro_rules! params {
     ($(#[$meta:meta])* pub struct $name:ident($group:literal) {
@@ -216,7 +239,7 @@ macro_rules! params {
             /// Name of the group in a parameter file.
             pub const GROUP: &'static str = $group;
 
-            /// What is known of each parameter, in the order of declaration.
+            /// The declarations of the parameters, in their order.
             pub fn specs() -> Vec<$crate::params::ParamSpec> {
                 let defaults = Self::default();
                 vec![$($crate::params::ParamSpec {
@@ -233,8 +256,8 @@ macro_rules! params {
             /// Sets one field from JSON.
             ///
             /// # Errors
-            /// [`Error::Parameter`](crate::Error::Parameter) if there is no such field, or the value has
-            /// the wrong type or is out of range.
+            /// [`Error::Parameter`](crate::Error::Parameter) if there is no such field, or the
+            /// value has the wrong type or is out of range.
             pub fn set(&mut self, field: &str, value: &$crate::params::Value) -> $crate::Result<()> {
                 match field {
                     $(stringify!($field) => {
@@ -287,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_is_read_held_against_its_range_and_described() {
+    fn a_field_is_read_compared_with_its_range_and_described() {
         let mut sample = Sample::default();
         sample.set("reach", &json!(0.25)).unwrap();
         sample.set("count", &json!(7)).unwrap();
@@ -309,5 +332,42 @@ mod tests {
         assert_eq!(specs[0].description, "How far.");
         assert_eq!(specs[0].unit, "m");
         assert_eq!(specs[1].range, Some([1.0, 10.0]));
+    }
+
+    crate::param_groups! {
+        /// For the tests.
+        pub struct Groups {
+            /// The only one.
+            sample: Sample,
+        }
+    }
+
+    #[test]
+    fn groups_are_set_by_a_document_and_name_what_they_do_not_know() {
+        use crate::params::Parameters;
+        let mut groups = Groups::default();
+        groups.set_all(&json!({"sample": {"reach": 0.75, "count": 2}})).unwrap();
+        assert_eq!((groups.sample.reach, groups.sample.count), (0.75, 2));
+        assert_eq!(groups.all_values()[0], ("sample.reach".to_owned(), json!(0.75)));
+        assert_eq!(Groups::all_specs().len(), 3);
+        for (document, says) in [
+            (json!({"other": {"reach": 1}}), "there is no group other"),
+            (json!({"sample": 3}), "expected a map"),
+            (json!(3), "parameters"),
+        ] {
+            let error = groups.set_all(&document).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn values_read_back_what_they_wrote() {
+        use crate::params::ParamValue;
+        assert_eq!(f64::from_value(&0.1_f64.to_value()), Some(0.1));
+        assert_eq!(usize::from_value(&7_usize.to_value()), Some(7));
+        assert_eq!(usize::from_value(&json!(-1)), None);
+        assert_eq!(bool::from_value(&true.to_value()), Some(true));
+        assert_eq!(String::from_value(&"a".to_owned().to_value()).as_deref(), Some("a"));
+        assert_eq!(Colour::from_value(&Colour::Green.to_value()), Some(Colour::Green));
     }
 }

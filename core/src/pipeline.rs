@@ -1,12 +1,33 @@
-//! The whole way from scans to a mesh, without ROS: prepare, register, filter, reconstruct.
+//! The stages from scans to a mesh in a row, without ROS: prepare, register, filter, reconstruct.
+//!
+//! ```
+//! use puffer_core::Progress;
+//! use puffer_core::geometry::{Cloud, Vec3};
+//! use puffer_core::pipeline::{PipelineInput, PipelineParams, PoseSource, run};
+//!
+//! // Points spread evenly over a ball of 5 cm radius (Fibonacci's lattice).
+//! let mut cloud = Cloud::default();
+//! for i in 0..2000 {
+//!     let (z, turn) = (1.0 - (f64::from(i) + 0.5) / 1000.0, 2.399_963 * f64::from(i));
+//!     let radius = (1.0 - z * z).sqrt();
+//!     let normal = Vec3::new(radius * turn.cos(), radius * turn.sin(), z);
+//!     cloud.push(normal * 0.05, normal, 1e-4, 1);
+//! }
+//! let input = PipelineInput::Cloud(cloud);
+//! let params = PipelineParams::default();
+//! let outcome = run(&input, PoseSource::Exact, &params, &Progress::silent())?;
+//! assert_eq!(outcome.verdict.distrust_reason(), None);
+//! # Ok::<(), puffer_core::Error>(())
+//! ```
 
 use crate::filter::{FilterParams, Filtered, filter};
 use crate::geometry::{Cloud, Pose};
 use crate::mesh::Mesh;
-use crate::mesh::io::{Unit, read_cloud_in};
+use crate::mesh::io::{Unit, read_cloud_with_unit};
 use crate::reconstruct::{ReconstructParams, reconstruct};
-use crate::register::{PreparedScan, RegisterParams, Registration, Status, register};
-use crate::scans::{PoseSigma, ScanSource, Support};
+use crate::register::{RegisterParams, Registration, register};
+use crate::scan::{PoseSigma, PreparedScan, Support};
+use crate::scan_files::ScanSource;
 use crate::verdict::{ModelVerdict, ScanCount};
 use crate::{Error, Progress, Result};
 use sha2::{Digest, Sha256};
@@ -14,56 +35,56 @@ use std::path::Path;
 
 crate::param_groups! {
     /// Parameters of all stages.
-    pub struct Params {
-        /// Of the registration.
+    pub struct PipelineParams {
+        /// Parameters of the registration.
         register: RegisterParams,
-        /// Of the filter.
+        /// Parameters of the filter.
         filter: FilterParams,
-        /// Of the reconstruction.
+        /// Parameters of the reconstruction.
         reconstruct: ReconstructParams,
     }
 }
 
 /// What a mesh can be made of.
-pub enum Input {
+pub enum PipelineInput {
     /// Scans with the robot's poses.
     Scans(ScanSource),
     /// One cloud of registered points with normals.
     Cloud(Cloud),
 }
 
-impl Input {
+impl PipelineInput {
     /// Opens a scan folder, a Stanford `.conf`, or a single PLY with normals.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Format`] or [`Error::Input`] with what is wrong and what to do.
-    pub fn open(path: &Path, unit: Unit) -> Result<Input> {
+    pub fn open(path: &Path, unit: Unit) -> Result<PipelineInput> {
         std::fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
         let is_ply = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
         if is_ply && path.is_file() {
-            return Ok(Input::Cloud(read_cloud_in(path, unit)?));
+            return Ok(PipelineInput::Cloud(read_cloud_with_unit(path, unit)?));
         }
-        Ok(Input::Scans(ScanSource::open(path, unit)?))
+        Ok(PipelineInput::Scans(ScanSource::open(path, unit)?))
     }
 }
 
-/// How the poses of the input are taken.
+/// Where the poses of the input come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Poses {
-    /// As a robot reports them: the scans are registered.
+pub enum PoseSource {
+    /// From a robot, with errors: the scans are registered.
     Robot,
-    /// As exact: the scans are not registered.
+    /// From an exact measurement: the scans are not registered.
     Exact,
 }
 
-/// Scans made ready: oriented points, poses, and the hash of all that went in.
-pub struct Prepared {
+/// Prepared scans: oriented points, names and poses, an element a scan.
+pub struct PreparedInput {
     /// Oriented points of each scan, sensor frame.
     pub scans: Vec<PreparedScan>,
     /// Name of each scan.
     pub names: Vec<String>,
-    /// The robot's `object_from_sensor` of each scan.
-    pub robot: Vec<Pose>,
+    /// Pose `object_from_sensor` of each scan as the robot reports it.
+    pub robot_poses: Vec<Pose>,
     /// Standard deviation of those poses, if known.
     pub pose_sigma: Option<PoseSigma>,
 }
@@ -71,12 +92,13 @@ pub struct Prepared {
 /// Reads all scans and estimates their normals.
 ///
 /// # Errors
-/// As [`ScanSource::view`], and [`Error::Input`] naming the view that cannot be used; [`Error::Cancelled`].
-pub fn prepare(files: &ScanSource, progress: &Progress) -> Result<Prepared> {
-    let mut prepared = Prepared {
+/// As [`ScanSource::view`], and [`Error::Input`] naming the view that cannot be used;
+/// [`Error::Cancelled`].
+pub fn prepare_scans(files: &ScanSource, progress: &Progress) -> Result<PreparedInput> {
+    let mut prepared = PreparedInput {
         scans: Vec::new(),
         names: Vec::new(),
-        robot: Vec::new(),
+        robot_poses: Vec::new(),
         pose_sigma: files.pose_sigma,
     };
     for index in 0..files.len() {
@@ -86,7 +108,7 @@ pub fn prepare(files: &ScanSource, progress: &Progress) -> Result<Prepared> {
             .map_err(|error| Error::input(format!("view {}: {error}", view.name)))?;
         prepared.scans.push(scan);
         prepared.names.push(view.name);
-        prepared.robot.push(view.object_from_sensor);
+        prepared.robot_poses.push(view.object_from_sensor);
     }
     progress.report("read", 1.0)?;
     Ok(prepared)
@@ -97,32 +119,31 @@ pub fn prepare(files: &ScanSource, progress: &Progress) -> Result<Prepared> {
 /// # Errors
 /// As [`register`].
 pub fn register_scans(
-    prepared: &Prepared,
-    poses: Poses,
+    prepared: &PreparedInput,
+    poses: PoseSource,
     params: &RegisterParams,
     progress: &Progress,
 ) -> Result<Registration> {
     match poses {
-        Poses::Robot => {
-            register(&prepared.scans, &prepared.robot, prepared.pose_sigma, params, progress)
+        PoseSource::Robot => {
+            register(&prepared.scans, &prepared.robot_poses, prepared.pose_sigma, params, progress)
         }
-        Poses::Exact => Ok(Registration::exact(&prepared.scans, &prepared.robot)),
+        PoseSource::Exact => Ok(Registration::exact(&prepared.scans, &prepared.robot_poses)),
     }
 }
 
-/// Combines the accepted scans.
+/// Combines the accepted scans into one cloud.
 ///
 /// # Errors
 /// As [`filter`].
 pub fn filter_scans(
-    prepared: &Prepared,
+    prepared: &PreparedInput,
     registration: &Registration,
     params: &FilterParams,
     progress: &Progress,
 ) -> Result<Filtered> {
-    let accepted = |i: &usize| registration.verdicts[*i].status == Status::Accepted;
     let scans: Vec<(&PreparedScan, Pose)> = (0..prepared.scans.len())
-        .filter(accepted)
+        .filter(|&i| registration.verdicts[i].is_accepted())
         .map(|i| (&prepared.scans[i], registration.poses[i]))
         .collect();
     filter(&scans, registration.residual, params, progress)
@@ -140,8 +161,9 @@ pub fn cloud_hash(cloud: &Cloud) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The comment lines of a mesh file: program, seed, and the hash of the cloud that the mesh was made of.
-pub fn comments(cloud: &Cloud, seed: u64) -> [String; 3] {
+/// The comment lines of a mesh file: program, seed, and the hash of the cloud that the mesh was
+/// made of.
+pub fn mesh_comments(cloud: &Cloud, seed: u64) -> [String; 3] {
     [
         format!("puffer {}", env!("CARGO_PKG_VERSION")),
         format!("seed {seed}"),
@@ -149,8 +171,8 @@ pub fn comments(cloud: &Cloud, seed: u64) -> [String; 3] {
     ]
 }
 
-/// What the whole way gives.
-pub struct Outcome {
+/// The results of all stages.
+pub struct PipelineOutcome {
     /// The mesh.
     pub mesh: Mesh,
     /// The cloud that it was made of.
@@ -165,17 +187,23 @@ pub struct Outcome {
     pub verdict: ModelVerdict,
 }
 
-/// From input to mesh. What the scans say of the object's support counts unless `params` say something else.
+/// Makes a mesh of the input by all stages. The object's support that the scans name counts unless
+/// `params` name another one.
 ///
 /// # Errors
 /// Those of the stages.
-pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) -> Result<Outcome> {
+pub fn run(
+    input: &PipelineInput,
+    poses: PoseSource,
+    params: &PipelineParams,
+    progress: &Progress,
+) -> Result<PipelineOutcome> {
     let files = match input {
-        Input::Cloud(cloud) => {
+        PipelineInput::Cloud(cloud) => {
             let mesh = reconstruct(cloud, &params.reconstruct, progress)?;
             let verdict = ModelVerdict::new(None, cloud, &mesh);
             let (cloud, measurements) = (cloud.clone(), cloud.len());
-            return Ok(Outcome {
+            return Ok(PipelineOutcome {
                 mesh,
                 cloud,
                 measurements,
@@ -184,18 +212,18 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
                 verdict,
             });
         }
-        Input::Scans(files) => files,
+        PipelineInput::Scans(files) => files,
     };
-    let prepared = prepare(files, progress)?;
+    let prepared = prepare_scans(files, progress)?;
     let registration = register_scans(&prepared, poses, &params.register, progress)?;
     let filtered = filter_scans(&prepared, &registration, &params.filter, progress)?;
-    let mut of_reconstruct = params.reconstruct.clone();
-    if of_reconstruct.support == Support::None {
-        of_reconstruct.support = files.support;
+    let mut reconstruct_params = params.reconstruct.clone();
+    if reconstruct_params.support == Support::None {
+        reconstruct_params.support = files.support;
     }
-    let mesh = reconstruct(&filtered.cloud, &of_reconstruct, progress)?;
+    let mesh = reconstruct(&filtered.cloud, &reconstruct_params, progress)?;
     let scans = ScanCount::from_verdicts(&registration.verdicts);
-    Ok(Outcome {
+    Ok(PipelineOutcome {
         verdict: ModelVerdict::new(scans, &filtered.cloud, &mesh),
         mesh,
         cloud: filtered.cloud,
@@ -203,4 +231,50 @@ pub fn run(input: &Input, poses: Poses, params: &Params, progress: &Progress) ->
         registration: Some(registration),
         names: prepared.names,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec3;
+
+    fn two_points() -> Cloud {
+        let mut cloud = Cloud::default();
+        cloud.push(Vec3::x(), Vec3::z(), 1e-4, 1);
+        cloud.push(Vec3::y(), Vec3::z(), 1e-4, 1);
+        cloud
+    }
+
+    #[test]
+    fn the_hash_covers_points_normals_and_sigma_but_not_support() {
+        let cloud = two_points();
+        let hash = cloud_hash(&cloud);
+        assert_eq!(hash.len(), 64);
+        let mut others = vec![cloud.clone(); 3];
+        others[0].points[0].x += 1e-12;
+        others[1].normals[1] = -Vec3::z();
+        others[2].sigma[0] = 2e-4;
+        assert!(others.iter().all(|other| cloud_hash(other) != hash));
+        let mut supported = cloud;
+        supported.support[0] = 9;
+        assert_eq!(cloud_hash(&supported), hash);
+        // The SHA-256 of nothing.
+        assert!(cloud_hash(&Cloud::default()).starts_with("e3b0c44298fc1c14"));
+    }
+
+    #[test]
+    fn comments_name_program_seed_and_cloud() {
+        let cloud = two_points();
+        let [program, seed, hash] = mesh_comments(&cloud, 7);
+        assert!(program.starts_with("puffer "), "{program}");
+        assert_eq!(seed, "seed 7");
+        assert_eq!(hash, format!("cloud sha256 {}", cloud_hash(&cloud)));
+    }
+
+    #[test]
+    fn a_path_that_is_not_there_is_named() {
+        let error = PipelineInput::open(Path::new("no/such/folder"), Unit::Metre).err().unwrap();
+        assert!(matches!(&error, Error::Io { action: "read", .. }), "{error}");
+        assert!(error.to_string().contains("no/such/folder"), "{error}");
+    }
 }

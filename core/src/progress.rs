@@ -1,4 +1,14 @@
 //! Progress and cancellation of long work.
+//!
+//! ```
+//! use puffer_core::{Error, Progress};
+//!
+//! let progress = Progress::silent();
+//! progress.report("filter", 0.5)?;
+//! progress.cancel();
+//! assert!(matches!(progress.report("filter", 0.6), Err(Error::Cancelled)));
+//! # Ok::<(), puffer_core::Error>(())
+//! ```
 
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -6,7 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 type Listener = dyn Fn(&str, f64) + Send + Sync;
 
-/// Handed to every long operation: takes the fraction done, and tells it to stop.
+/// Progress and cancel flag of a long operation: the operation reports the fraction that is done,
+/// and learns from the report whether it must stop.
 ///
 /// Clones share the cancel flag and the listener.
 #[derive(Clone, Default)]
@@ -16,13 +27,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Progress that is reported to nobody.
+    /// Progress without a listener.
     pub fn silent() -> Self {
         Self::default()
     }
 
     /// Progress reported to `listener(stage, fraction)`, with the fraction in 0..=1.
-    pub fn to(listener: impl Fn(&str, f64) + Send + Sync + 'static) -> Self {
+    pub fn with_listener(listener: impl Fn(&str, f64) + Send + Sync + 'static) -> Self {
         Self { cancelled: Arc::default(), listener: Some(Arc::new(listener)) }
     }
 
@@ -57,5 +68,19 @@ mod tests {
         assert!(clone.report("stage", 0.5).is_ok());
         progress.cancel();
         assert!(matches!(clone.report("stage", 0.6), Err(Error::Cancelled)));
+    }
+
+    #[test]
+    fn the_listener_gets_stages_and_fractions_within_their_bounds() {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let progress = Progress::with_listener(move |stage, fraction| {
+            let _ = sender.send((stage.to_owned(), fraction));
+        });
+        for fraction in [-0.5, 0.25, 1.5] {
+            progress.report("stage", fraction).unwrap();
+        }
+        let reports: Vec<(String, f64)> = receiver.try_iter().collect();
+        assert_eq!(reports.iter().map(|r| r.1).collect::<Vec<_>>(), [0.0, 0.25, 1.0]);
+        assert!(reports.iter().all(|r| r.0 == "stage"));
     }
 }

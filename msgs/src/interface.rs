@@ -1,4 +1,4 @@
-//! What the generated types have in common.
+//! The traits of the generated types, and the messages that all actions share.
 
 use crate::builtin_interfaces::msg::Time;
 use crate::unique_identifier_msgs::msg::UUID;
@@ -8,102 +8,122 @@ use std::fmt::Debug;
 
 /// A type that can be published and recorded: a message, or a part of a service or action.
 pub trait Interface: Message + Clone + Debug + Default + PartialEq + Send + Sync + 'static {
-    /// Package that defines it: `sensor_msgs`.
+    /// Package that defines the type: `sensor_msgs`.
     const PACKAGE: &'static str;
     /// `msg`, `srv` or `action`.
     const KIND: &'static str;
     /// Name within the package: `PointCloud2`, `PlanView_Request`, `ModelObject_FeedbackMessage`.
     const NAME: &'static str;
-    /// The three in a row: `sensor_msgs/msg/PointCloud2`.
+    /// Package, kind and name: `sensor_msgs/msg/PointCloud2`.
     const TYPE_NAME: &'static str;
-    /// Text of the .msg file, followed by those of all types inside, as bags store it (`ros2msg`).
+    /// Text of the .msg file, followed by the texts of all types inside, as bags store it
+    /// (`ros2msg`).
     const DEFINITION: &'static str;
 }
 
 /// A service, or one of the services of an action.
 pub trait Service: Send + Sync + 'static {
-    /// Package that defines it.
+    /// Package that defines the type.
     const PACKAGE: &'static str;
     /// `srv`, or `action` for the services of an action.
     const KIND: &'static str;
     /// Name within the package: `PlanView`, `ModelObject_SendGoal`.
     const NAME: &'static str;
-    /// The three in a row: `puffer_msgs/srv/PlanView`.
+    /// Package, kind and name: `puffer_msgs/srv/PlanView`.
     const TYPE_NAME: &'static str;
-    /// What a client sends.
+    /// The message that a client sends.
     type Request: Message + Clone + Debug + Default + PartialEq + Send + Sync + 'static;
-    /// What a server answers.
+    /// The message that a server answers.
     type Response: Message + Clone + Debug + Default + PartialEq + Send + Sync + 'static;
 }
 
 /// An action: its three parts, and the services that ROS 2 makes of them. Cancelling uses
-/// `action_msgs/srv/CancelGoal`, the status topic `action_msgs/msg/GoalStatusArray`, the feedback topic
-/// [`FeedbackMessage`].
+/// `action_msgs/srv/CancelGoal`, the status topic `action_msgs/msg/GoalStatusArray`, the feedback
+/// topic [`FeedbackMessage`].
 pub trait Action: Send + Sync + 'static {
-    /// Package that defines it.
+    /// Package that defines the type.
     const PACKAGE: &'static str;
     /// Name within the package: `ModelObject`.
     const NAME: &'static str;
-    /// `puffer_msgs/action/ModelObject`.
+    /// Package, kind and name: `puffer_msgs/action/ModelObject`.
     const TYPE_NAME: &'static str;
-    /// What is asked.
+    /// What a client asks for.
     type Goal: Interface;
-    /// What comes out.
+    /// What comes out at the end.
     type Result: Interface;
-    /// What is told in between.
+    /// What the server tells in between.
     type Feedback: Interface;
-    /// The service that takes a goal in, `<action>/_action/send_goal`.
+    /// The service that accepts goals, `<action>/_action/send_goal`.
     type SendGoal: Service<Request = SendGoalRequest<Self::Goal>, Response = SendGoalResponse>;
-    /// The service that gives the result, `<action>/_action/get_result`.
+    /// The service that returns results, `<action>/_action/get_result`.
     type GetResult: Service<Request = GetResultRequest, Response = GetResultResponse<Self::Result>>;
 }
 
-/// Does something with each type of this crate; see [`visit_types`](crate::visit_types).
+/// Is shown each type of this crate by [`visit_types`](crate::visit_types): a way to choose a type
+/// by its name at run time.
+///
+/// ```
+/// use puffer_msgs::{Interface, TypeVisitor, visit_types};
+///
+/// struct DefaultSize(&'static str, Option<usize>);
+///
+/// impl TypeVisitor for DefaultSize {
+///     fn visit<T: Interface>(&mut self) {
+///         if T::TYPE_NAME == self.0 {
+///             self.1 = puffer_msgs::cdr::to_bytes(&T::default()).ok().map(|bytes| bytes.len());
+///         }
+///     }
+/// }
+///
+/// let mut size = DefaultSize("geometry_msgs/msg/Point", None);
+/// visit_types(&mut size);
+/// assert_eq!(size.1, Some(4 + 3 * 8));
+/// ```
 pub trait TypeVisitor {
-    /// Is shown the type `T`.
+    /// Takes the type `T`.
     fn visit<T: Interface>(&mut self);
 }
 
-/// A goal and the number that its client gave it.
+/// A goal, and the identity that its client chose for it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalRequest<G> {
-    /// Chosen by the client.
+    /// The goal's identity, chosen by the client.
     pub goal_id: UUID,
-    /// What is asked.
+    /// What the client asks for.
     pub goal: G,
 }
 
-/// Whether a goal was taken in.
+/// Whether a goal was accepted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SendGoalResponse {
-    /// False: refused.
+    /// Whether the goal was accepted.
     pub accepted: bool,
-    /// When.
+    /// When the server decided.
     pub stamp: Time,
 }
 
-/// Asks for a result; the answer comes when the goal has ended.
+/// A request for a result; the answer comes when the goal has ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GetResultRequest {
-    /// That of the goal.
+    /// The goal's identity.
     pub goal_id: UUID,
 }
 
-/// How a goal ended.
+/// How a goal ended, and its result.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GetResultResponse<R> {
     /// One of the constants of `action_msgs/msg/GoalStatus`.
     pub status: i8,
-    /// What came out.
+    /// The result; empty if the goal is unknown.
     pub result: R,
 }
 
-/// Feedback of one goal.
+/// Feedback, and the goal that it belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FeedbackMessage<F> {
-    /// That of the goal.
+    /// The goal's identity.
     pub goal_id: UUID,
-    /// What is told.
+    /// What the server tells.
     pub feedback: F,
 }
 

@@ -2,69 +2,71 @@
 
 use crate::builtin_interfaces::msg::{Duration, Time};
 
-const BILLION: i64 = 1_000_000_000;
+/// Nanoseconds in a second.
+const NANOS_PER_SECOND: i64 = 1_000_000_000;
 
-/// Whole seconds and the nanoseconds above them; seconds beyond 32 bits are cut off at the limit.
+/// Whole seconds and the nanoseconds above them; seconds beyond 32 bits saturate.
 fn split(nanoseconds: i64) -> (i32, u32) {
-    let seconds = nanoseconds.div_euclid(BILLION);
+    let seconds = nanoseconds.div_euclid(NANOS_PER_SECOND);
     match i32::try_from(seconds) {
-        Ok(seconds) => (seconds, nanoseconds.rem_euclid(BILLION) as u32),
+        Ok(seconds) => (seconds, nanoseconds.rem_euclid(NANOS_PER_SECOND) as u32),
         Err(_) if seconds < 0 => (i32::MIN, 0),
-        Err(_) => (i32::MAX, BILLION as u32 - 1),
+        Err(_) => (i32::MAX, NANOS_PER_SECOND as u32 - 1),
     }
 }
 
-/// Seconds as whole nanoseconds; what is too large is cut off, NaN is 0. The product of a present-day stamp and a
-/// billion would lose 100 ns, so whole seconds go apart.
-fn nanoseconds_of(seconds: f64) -> i64 {
+/// Seconds as whole nanoseconds; too large values saturate, and NaN is 0. The product of a
+/// present-day stamp and a billion would lose 100 ns, so whole seconds are converted apart.
+fn nanoseconds_from_seconds(seconds: f64) -> i64 {
     let whole = seconds.floor();
-    let rest = ((seconds - whole) * BILLION as f64).round() as i64;
-    (whole as i64).saturating_mul(BILLION).saturating_add(rest)
+    let rest = ((seconds - whole) * NANOS_PER_SECOND as f64).round() as i64;
+    (whole as i64).saturating_mul(NANOS_PER_SECOND).saturating_add(rest)
 }
 
 impl Time {
-    /// From nanoseconds since the epoch; what 32 bits of seconds cannot hold is cut off at the limit.
+    /// The time of a number of nanoseconds since the epoch; saturates at what 32 bits of seconds
+    /// hold.
     pub fn from_nanoseconds(nanoseconds: i64) -> Self {
         let (sec, nanosec) = split(nanoseconds);
         Time { sec, nanosec }
     }
 
-    /// Nanoseconds since the epoch.
+    /// Number of nanoseconds since the epoch.
     pub fn nanoseconds(&self) -> i64 {
-        i64::from(self.sec) * BILLION + i64::from(self.nanosec)
+        i64::from(self.sec) * NANOS_PER_SECOND + i64::from(self.nanosec)
     }
 
-    /// From seconds since the epoch.
+    /// The time of a number of seconds since the epoch; saturates.
     pub fn from_seconds(seconds: f64) -> Self {
-        Time::from_nanoseconds(nanoseconds_of(seconds))
+        Time::from_nanoseconds(nanoseconds_from_seconds(seconds))
     }
 
-    /// Seconds since the epoch.
+    /// Number of seconds since the epoch.
     pub fn seconds(&self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) / BILLION as f64
+        f64::from(self.sec) + f64::from(self.nanosec) / NANOS_PER_SECOND as f64
     }
 }
 
 impl Duration {
-    /// From nanoseconds; what 32 bits of seconds cannot hold is cut off at the limit.
+    /// The duration of a number of nanoseconds; saturates at what 32 bits of seconds hold.
     pub fn from_nanoseconds(nanoseconds: i64) -> Self {
         let (sec, nanosec) = split(nanoseconds);
         Duration { sec, nanosec }
     }
 
-    /// Nanoseconds.
+    /// Number of nanoseconds.
     pub fn nanoseconds(&self) -> i64 {
-        i64::from(self.sec) * BILLION + i64::from(self.nanosec)
+        i64::from(self.sec) * NANOS_PER_SECOND + i64::from(self.nanosec)
     }
 
-    /// From seconds.
+    /// The duration of a number of seconds; saturates.
     pub fn from_seconds(seconds: f64) -> Self {
-        Duration::from_nanoseconds(nanoseconds_of(seconds))
+        Duration::from_nanoseconds(nanoseconds_from_seconds(seconds))
     }
 
-    /// Seconds.
+    /// Number of seconds.
     pub fn seconds(&self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) / BILLION as f64
+        f64::from(self.sec) + f64::from(self.nanosec) / NANOS_PER_SECOND as f64
     }
 }
 
@@ -74,9 +76,15 @@ mod tests {
 
     #[test]
     fn time_and_nanoseconds_are_the_same_both_ways() {
-        for nanoseconds in
-            [0, 1, 999_999_999, BILLION, 1_764_028_800 * BILLION + 5, -1, -BILLION - 7]
-        {
+        for nanoseconds in [
+            0,
+            1,
+            999_999_999,
+            NANOS_PER_SECOND,
+            1_764_028_800 * NANOS_PER_SECOND + 5,
+            -1,
+            -NANOS_PER_SECOND - 7,
+        ] {
             assert_eq!(Time::from_nanoseconds(nanoseconds).nanoseconds(), nanoseconds);
             assert_eq!(Duration::from_nanoseconds(nanoseconds).nanoseconds(), nanoseconds);
         }

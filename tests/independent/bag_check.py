@@ -5,7 +5,7 @@
 
 3. Both read the bag of a run, in whole, and count what `puffer bag info` counts.
 
-bag_check.py FOLDER_OF_THE_EXAMPLES, after: cargo build --release -p puffer_shell --examples
+bag_check.py FOLDER_OF_THE_EXAMPLES, after: cargo build --release -p puffer_ros --examples
 bag_check.py --run BAG PUFFER, with the bag of a run and the program
 Wants: pip install -r requirements-bags.txt
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Tries puffer's ROS glue against another DDS implementation: Eclipse Cyclone DDS (PyPI cyclonedds 11.0.1).
 
-Usage: cargo build --release -p puffer_shell --example peer
+Usage: cargo build --release -p puffer_ros --example peer
        python -m venv VENV && VENV/bin/pip install -r tests/independent/requirements-dds.txt
        VENV/bin/python tests/independent/dds_check.py [--peer target/release/examples/peer] [--domain 77]
 

@@ -1,13 +1,13 @@
-"""Registers scan folders with Open3D and small_gicp, for `puffer bench registration --judge`.
+"""Registers scan folders with Open3D and small_gicp, for `puffer-bench registration --judge`.
 
-    puffer bench registration --keep DIR ...                  writes scan folders, measures puffer
+    puffer-bench registration --keep DIR ...                  writes scan folders, measures puffer
     python register.py DIR                                    writes DIR/CASE.open3d.json, DIR/CASE.small_gicp.json
-    puffer bench registration --keep DIR --judge open3d ...   measures those poses in the same way
+    puffer-bench registration --keep DIR --judge open3d ...   measures those poses in the same way
 
 Both peers do the same, in the two rounds of Open3D's own reconstruction system, register and refine: pairwise alignment
 of all scans that overlap at the robot's poses, Open3D's pose graph over these pairs, then all pairs that overlap at its
 poses once more, and the graph over these. Open3D aligns by point-to-plane ICP, small_gicp by GICP. Neither takes the
-robot's pose as anything but the start. For times in one thread, set OMP_NUM_THREADS=1, and give puffer --threads 1.
+robot's pose as anything but the start. For times in one thread, set OMP_NUM_THREADS=1, and give puffer-bench --threads 1.
 
 Why it is set so: scans are not taken in sequence, so no edge is certain, and the graph's line process may give up any
 of them (one that is certain and slid drags the rest along). Alignments with few correspondences are left out. No search

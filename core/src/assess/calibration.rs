@@ -1,20 +1,33 @@
 //! Whether each vertex's standard deviation says how wrong it is.
 //!
-//! The error of an observed vertex is its signed distance to the truth, positive outside, after one rigid fit of all
-//! observed vertices. That fit takes away part of every error, so sigma is taken conditional on it: with
-//! independent errors and P = J (J^T J)^-1 J^T the residuals' covariance is (I - P) Sigma (I - P)^T.
+//! The error of an observed vertex is its signed distance to the truth, positive outside, after one
+//! rigid fit of all observed vertices. That fit takes away a part of every error, so sigma is taken
+//! conditional on it. With independent errors of covariance Sigma and the hat matrix of the fit
+//!
+//! P = J (J^T J)^-1 J^T,                             (1)
+//!
+//! the covariance of the residuals is
+//!
+//! (I - P) Sigma (I - P)^T.                          (2)
 
-use super::align::{Frame, align, apply};
-use super::reference::{Nearest, Reference};
-use super::stats::{mean, rank_correlation};
-use crate::geometry::{Mat6, Vec3};
+use super::distances::MM_PER_M;
+use super::reference_surface::{NearestPoint, ReferenceSurface};
+use super::statistics::{mean, rank_correlation};
+use super::surface_icp::{NormalizedFrame, align_to_surface};
+use crate::geometry::{Mat6, Pose, Twist, Vec3, transform};
 use crate::mesh::Mesh;
 use crate::{Progress, Result};
 use serde::Serialize;
 
+/// Fewer observed vertices than this give no shares worth telling.
+const MIN_VERTICES: usize = 10;
+/// Eigenvalues of the fit's Hessian below this share of its largest diagonal element are directions
+/// that the surface does not constrain.
+const MIN_EIGENVALUE_RATIO: f64 = 1e-6;
+
 /// How well the standard deviations of a mesh's vertices match their errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Calibration {
+pub struct SigmaCalibration {
     /// Share of the observed vertices whose error is at most sigma (0.683 if errors are normal).
     pub within_1_sigma: f64,
     /// Share of the observed vertices whose error is at most 2 sigma (0.954 if errors are normal).
@@ -29,28 +42,26 @@ pub struct Calibration {
     pub calibration_vertices: usize,
 }
 
-/// Calibration of `mesh` against `truth`; `None` if fewer than 10 observed vertices have a sigma. A mesh that does
-/// not say which vertices are observed is taken at its sigma's word.
+/// Compares the sigma of the vertices of `mesh` with their errors against `truth` (same frame,
+/// metres).
+///
+/// Returns `None` if fewer than 10 observed vertices have a sigma. In a mesh without `observed`
+/// flags all vertices with a positive, finite sigma count as observed.
 ///
 /// # Errors
 /// [`crate::Error::Cancelled`].
-pub fn calibration(
+pub fn assess_sigma(
     mesh: &Mesh,
-    truth: &Reference,
+    truth: &ReferenceSurface,
     progress: &Progress,
-) -> Result<Option<Calibration>> {
-    let usable = |&i: &usize| {
-        mesh.observed.get(i).copied().unwrap_or(true)
-            && mesh.sigma[i].is_finite()
-            && mesh.sigma[i] > 0.0
-    };
-    let chosen: Vec<usize> = (0..mesh.sigma.len()).filter(usable).collect();
-    if chosen.len() < 10 {
+) -> Result<Option<SigmaCalibration>> {
+    let chosen: Vec<usize> = (0..mesh.sigma.len()).filter(|&i| has_sigma(mesh, i)).collect();
+    if chosen.len() < MIN_VERTICES {
         return Ok(None);
     }
     let points: Vec<Vec3> = chosen.iter().map(|&i| mesh.vertices[i]).collect();
-    let pose = align(&points, truth, progress)?.pose;
-    let moved: Vec<Vec3> = points.iter().map(|p| apply(&pose, p)).collect();
+    let pose = align_to_surface(&points, truth, progress)?.pose;
+    let moved: Vec<Vec3> = points.iter().map(|p| transform(&pose, p)).collect();
     let nearest = truth.nearest_all(&moved);
     let sigma: Vec<f64> = chosen.iter().map(|&i| mesh.sigma[i]).collect();
     let sigma = conditional_sigma(&moved, &nearest, &sigma);
@@ -59,44 +70,57 @@ pub fn calibration(
         .zip(&nearest)
         .map(|(p, n)| n.distance.copysign(n.normal.dot(&(p - n.point))))
         .collect();
-    let within = |k: f64| {
-        let inside = error.iter().zip(&sigma).filter(|(e, s)| e.abs() <= k * **s).count();
-        inside as f64 / error.len() as f64
-    };
     let size: Vec<f64> = error.iter().map(|e| e.abs()).collect();
-    Ok(Some(Calibration {
-        within_1_sigma: within(1.0),
-        within_2_sigma: within(2.0),
+    Ok(Some(SigmaCalibration {
+        within_1_sigma: share_within(1.0, &error, &sigma),
+        within_2_sigma: share_within(2.0, &error, &sigma),
         sigma_rank_correlation: rank_correlation(&sigma, &size),
-        error_bias: 1000.0 * mean(&error),
-        sigma_mean: 1000.0 * mean(&sigma),
+        error_bias: MM_PER_M * mean(&error),
+        sigma_mean: MM_PER_M * mean(&sigma),
         calibration_vertices: error.len(),
     }))
 }
 
-/// Standard deviations of what the fit leaves of independent errors with standard deviations `sigma`.
-fn conditional_sigma(points: &[Vec3], nearest: &[Nearest], sigma: &[f64]) -> Vec<f64> {
-    let Some(frame) = Frame::of(points, &crate::geometry::Pose::identity()) else {
+/// Whether `vertex` is observed and has a positive, finite standard deviation.
+fn has_sigma(mesh: &Mesh, vertex: usize) -> bool {
+    mesh.observed.get(vertex).copied().unwrap_or(true)
+        && mesh.sigma[vertex].is_finite()
+        && mesh.sigma[vertex] > 0.0
+}
+
+/// Share of the errors that are at most `factor` times their sigma.
+fn share_within(factor: f64, errors: &[f64], sigma: &[f64]) -> f64 {
+    let inside = errors.iter().zip(sigma).filter(|(e, s)| e.abs() <= factor * **s).count();
+    inside as f64 / errors.len() as f64
+}
+
+/// Standard deviations of the residuals that a rigid fit leaves of independent errors with standard
+/// deviations `sigma`.
+fn conditional_sigma(points: &[Vec3], nearest: &[NearestPoint], sigma: &[f64]) -> Vec<f64> {
+    let Some(frame) = NormalizedFrame::new(points, &Pose::identity()) else {
         return sigma.to_vec();
     };
-    let jacobian = |i: usize| frame.jacobian(&points[i], &nearest[i].normal);
+    let jacobians: Vec<Twist> =
+        points.iter().zip(nearest).map(|(p, n)| frame.jacobian(p, &n.normal)).collect();
     let (mut hessian, mut spread) = (Mat6::zeros(), Mat6::zeros());
-    for (i, s) in sigma.iter().enumerate() {
-        let outer = jacobian(i) * jacobian(i).transpose();
+    for (j, s) in jacobians.iter().zip(sigma) {
+        let outer = j * j.transpose();
         hessian += outer;
         spread += outer * (s * s);
     }
     // Directions that the surface does not constrain are not fitted.
-    let Ok(inverse) = hessian.pseudo_inverse(1e-6 * hessian.diagonal().max()) else {
+    let Ok(inverse) = hessian.pseudo_inverse(MIN_EIGENVALUE_RATIO * hessian.diagonal().max())
+    else {
         return sigma.to_vec();
     };
     let middle = inverse * spread * inverse;
-    let remaining = |(i, s): (usize, &f64)| {
-        let j = jacobian(i);
-        let leverage = j.dot(&(inverse * j));
-        (s * s * (1.0 - 2.0 * leverage) + j.dot(&(middle * j))).max(0.0).sqrt()
-    };
-    sigma.iter().enumerate().map(remaining).collect()
+    let pairs = jacobians.iter().zip(sigma);
+    pairs
+        .map(|(j, s)| {
+            let leverage = j.dot(&(inverse * j)); // (1), diagonal
+            (s * s * (1.0 - 2.0 * leverage) + j.dot(&(middle * j))).max(0.0).sqrt() // (2), diagonal
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -122,9 +146,9 @@ mod tests {
         mesh
     }
 
-    fn measure(mesh: &Mesh) -> Option<Calibration> {
-        let truth = Reference::new(&sphere(0.1, 5)).unwrap();
-        calibration(mesh, &truth, &Progress::silent()).unwrap()
+    fn measure(mesh: &Mesh) -> Option<SigmaCalibration> {
+        let truth = ReferenceSurface::new(&sphere(0.1, 5)).unwrap();
+        assess_sigma(mesh, &truth, &Progress::silent()).unwrap()
     }
 
     #[test]
@@ -159,7 +183,7 @@ mod tests {
         let mesh = cuboid(Vec3::zeros(), Vec3::new(0.1, 0.2, 0.3));
         let samples = super::super::sample_surface(&mesh, 30, 1, 0).unwrap();
         let points: Vec<Vec3> = samples.iter().map(|s| s.point).collect();
-        let nearest = Reference::new(&mesh).unwrap().nearest_all(&points);
+        let nearest = ReferenceSurface::new(&mesh).unwrap().nearest_all(&points);
         let left = conditional_sigma(&points, &nearest, &[2.0; 30]);
         let total: f64 = left.iter().map(|s| s * s / 4.0).sum();
         assert!((total - 24.0).abs() < 1e-9, "{total}");

@@ -6,7 +6,8 @@ use rand_distr::{Distribution, Normal};
 
 const NOISE: f64 = 2e-4;
 
-/// A plane patch of 60 x 60 mm, 0.3 m before the sensor, with noise along the ray and some outliers.
+/// A plane patch of 60 x 60 mm, 0.3 m before the sensor, with noise along the ray and some
+/// outliers.
 fn plane(seed: u64, outliers: usize) -> PreparedScan {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let noise = Normal::new(0.0, NOISE).unwrap();
@@ -26,12 +27,12 @@ fn plane(seed: u64, outliers: usize) -> PreparedScan {
     PreparedScan::new(&Scan { points, ..Scan::default() }).unwrap()
 }
 
-fn filtered(method: Method, tune: impl Fn(&mut FilterParams)) -> Filtered {
+fn filtered(method: FilterMethod, tune: impl Fn(&mut FilterParams)) -> Filtered {
     let scans: Vec<PreparedScan> = (0..6).map(|seed| plane(seed, 150)).collect();
     let list: Vec<(&PreparedScan, Pose)> = scans.iter().map(|s| (s, Pose::identity())).collect();
     let mut params = FilterParams { method, ..FilterParams::default() };
     tune(&mut params);
-    filter(&list, NOISE, &params, &Progress::silent()).unwrap()
+    filter(&list, Some(NOISE), &params, &Progress::silent()).unwrap()
 }
 
 fn errors(cloud: &Cloud) -> (f64, f64) {
@@ -42,7 +43,7 @@ fn errors(cloud: &Cloud) -> (f64, f64) {
 
 #[test]
 fn the_weighted_filter_averages_the_noise_and_drops_outliers() {
-    let result = filtered(Method::Weighted, |_| ());
+    let result = filtered(FilterMethod::Weighted, |_| ());
     let (rms, worst) = errors(&result.cloud);
     assert!(rms < NOISE / 4.0 && worst < 2.0 * NOISE, "{rms} {worst}");
     assert!(result.cloud.normals.iter().all(|n| n.dot(&-Vec3::z()) > 0.95));
@@ -53,7 +54,7 @@ fn the_weighted_filter_averages_the_noise_and_drops_outliers() {
 
 #[test]
 fn the_thesis_filter_averages_too() {
-    let result = filtered(Method::Thesis, |p| {
+    let result = filtered(FilterMethod::Thesis, |p| {
         p.noise_radius = 2e-3;
         p.reduction_radius = 1e-3;
     });
@@ -63,10 +64,10 @@ fn the_thesis_filter_averages_too() {
 
 #[test]
 fn the_reduction_radius_sets_the_distance_of_the_points() {
-    let count = |radius: f64| {
-        filtered(Method::Weighted, |p| p.reduction_radius = radius).cloud.len() as f64
-    };
-    let ratio = count(1e-3) / count(2e-3);
+    let [dense, sparse] = [1e-3, 2e-3].map(|radius| {
+        filtered(FilterMethod::Weighted, |p| p.reduction_radius = radius).cloud.len() as f64
+    });
+    let ratio = dense / sparse;
     assert!(ratio > 3.0 && ratio < 5.0, "{ratio}");
 }
 
@@ -80,9 +81,13 @@ fn opposite_sides_of_a_thin_wall_stay_apart() {
         nalgebra::UnitQuaternion::from_axis_angle(&Vec3::y_axis(), std::f64::consts::PI),
     );
     let params = FilterParams { noise_radius: 2e-3, ..FilterParams::default() };
-    let result =
-        filter(&[(&front, Pose::identity()), (&back, turn)], NOISE, &params, &Progress::silent())
-            .unwrap();
+    let result = filter(
+        &[(&front, Pose::identity()), (&back, turn)],
+        Some(NOISE),
+        &params,
+        &Progress::silent(),
+    )
+    .unwrap();
     for (p, n) in result.cloud.points.iter().zip(&result.cloud.normals) {
         let expected = if n.z < 0.0 { 0.3 } else { 0.301 };
         assert!((p.z - expected).abs() < 2.5 * NOISE, "{p} {n}");
@@ -91,18 +96,18 @@ fn opposite_sides_of_a_thin_wall_stay_apart() {
 
 #[test]
 fn one_and_two_threads_give_the_same_bits() {
-    let run = |threads| {
+    let [one, two] = [1, 2].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| filtered(Method::Weighted, |_| ()).cloud)
-    };
-    assert_eq!(run(1), run(2));
+        pool.install(|| filtered(FilterMethod::Weighted, |_| ()).cloud)
+    });
+    assert_eq!(one, two);
 }
 
 #[test]
 fn nothing_left_says_what_to_change() {
     let scan = plane(1, 0);
     let params = FilterParams { min_measurements: 1_000_000, ..FilterParams::default() };
-    let error =
-        filter(&[(&scan, Pose::identity())], NOISE, &params, &Progress::silent()).unwrap_err();
+    let error = filter(&[(&scan, Pose::identity())], Some(NOISE), &params, &Progress::silent())
+        .unwrap_err();
     assert!(error.to_string().contains("filter.min_measurements"), "{error}");
 }

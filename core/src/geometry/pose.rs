@@ -7,12 +7,37 @@ use super::{Mat3, Vec3};
 use crate::{Error, Result};
 use nalgebra::{Matrix4, Rotation3, Translation3, UnitQuaternion};
 
+/// Rotation angle, radians, below which the closed form of the Jacobian loses more digits than the
+/// series leaves out.
+const MIN_CLOSED_FORM_ANGLE: f64 = 1e-5;
+/// Largest distance of the last row of a matrix from 0 0 0 1.
+const MAX_LAST_ROW_ERROR: f64 = 1e-6;
+/// Largest distance of a rotation matrix from an orthonormal one.
+const MAX_ORTHONORMALITY_ERROR: f64 = 1e-3;
+/// Accuracy and number of the iterations that project a matrix to the nearest rotation.
+const ROTATION_ACCURACY: f64 = 1e-15;
+const MAX_ROTATION_ITERATIONS: usize = 100;
+
 /// A rigid transform; `a_from_b * point_in_b` is the point in frame `a`.
 pub type Pose = nalgebra::Isometry3<f64>;
 /// A twist (x, y, z, rx, ry, rz).
 pub type Twist = nalgebra::Vector6<f64>;
 /// A covariance or information matrix over a [`Twist`].
 pub type Mat6 = nalgebra::Matrix6<f64>;
+
+/// The coordinates in frame `a` of a point that is given in frame `b`, metres. (`Pose * Vec3` would
+/// only rotate: nalgebra takes a vector for a direction.)
+///
+/// ```
+/// use puffer_core::geometry::{Pose, Vec3, transform};
+///
+/// let object_from_sensor = Pose::translation(0.0, 0.0, 0.3);
+/// let point = transform(&object_from_sensor, &Vec3::new(0.1, 0.0, 0.2));
+/// assert_eq!(point, Vec3::new(0.1, 0.0, 0.5));
+/// ```
+pub fn transform(a_from_b: &Pose, point: &Vec3) -> Vec3 {
+    a_from_b.rotation * point + a_from_b.translation.vector
+}
 
 /// The matrix of the cross product: `skew(a) * b = a x b`.
 pub fn skew(a: &Vec3) -> Mat3 {
@@ -35,11 +60,12 @@ pub fn log(pose: &Pose) -> Twist {
     Twist::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
+/// The left Jacobian of SO(3) (Barfoot 2017, eq. 7.37).
 fn left_jacobian(phi: &Vec3) -> Mat3 {
     let angle = phi.norm();
     let cross = skew(phi);
-    // Below this angle the closed form loses more digits than the series leaves out.
-    if angle < 1e-5 {
+    if angle < MIN_CLOSED_FORM_ANGLE {
+        // The first three terms of the series: 1, 1 / 2! and 1 / 3!.
         return Mat3::identity() + cross / 2.0 + cross * cross / 6.0;
     }
     let square = angle * angle;
@@ -62,25 +88,31 @@ pub fn adjoint(pose: &Pose) -> Mat6 {
 ///
 /// # Errors
 /// [`Error::Input`] if a number is not finite, the last row is not 0 0 0 1, or the rotation is not
-/// orthonormal to 1e-3 or is a reflection. Smaller deviations (text with few digits) are projected away.
+/// orthonormal to 1e-3 or is a reflection. Smaller deviations (text with few digits) are projected
+/// away.
 pub fn pose_from_rows(rows: &[[f64; 4]; 4]) -> Result<Pose> {
     let matrix = Matrix4::from_fn(|r, c| rows[r][c]);
     if matrix.iter().any(|v| !v.is_finite()) {
         return Err(Error::input("the matrix holds a number that is not finite"));
     }
-    if (matrix.row(3) - nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0)).norm() > 1e-6 {
+    if (matrix.row(3) - nalgebra::RowVector4::new(0.0, 0.0, 0.0, 1.0)).norm() > MAX_LAST_ROW_ERROR {
         return Err(Error::input("the last row of the matrix must be 0 0 0 1 (is it transposed?)"));
     }
     let rotation: Mat3 = matrix.fixed_view::<3, 3>(0, 0).into_owned();
     let deviation = (rotation.transpose() * rotation - Mat3::identity()).norm();
-    if deviation > 1e-3 || rotation.determinant() < 0.0 {
+    if deviation > MAX_ORTHONORMALITY_ERROR || rotation.determinant() < 0.0 {
         return Err(Error::input(format!(
             "the matrix is not a rigid transform: its upper left 3 x 3 block has determinant {:.4} and \
              differs from a rotation by {deviation:.4}; remove scale, shear or mirroring",
             rotation.determinant()
         )));
     }
-    let rotation = Rotation3::from_matrix_eps(&rotation, 1e-15, 100, Rotation3::identity());
+    let rotation = Rotation3::from_matrix_eps(
+        &rotation,
+        ROTATION_ACCURACY,
+        MAX_ROTATION_ITERATIONS,
+        Rotation3::identity(),
+    );
     Ok(Pose::from_parts(
         Translation3::new(rows[0][3], rows[1][3], rows[2][3]),
         UnitQuaternion::from_rotation_matrix(&rotation),
@@ -124,6 +156,28 @@ mod tests {
     }
 
     #[test]
+    fn a_point_is_rotated_and_moved_as_by_the_matrix() {
+        let (pose, point) = (exp(&twist()), Vec3::new(0.3, -0.7, 1.1));
+        let expected = pose.to_homogeneous() * point.push(1.0);
+        assert!((transform(&pose, &point) - expected.xyz()).norm() < 1e-15);
+        assert!((transform(&pose.inverse(), &transform(&pose, &point)) - point).norm() < 1e-15);
+    }
+
+    #[test]
+    fn the_left_jacobian_is_the_derivative_of_exp() {
+        // Finite differences: exp(phi + d) = exp(J d) exp(phi) to first order.
+        let phi = Vec3::new(0.4, -0.9, 0.2);
+        let (jacobian, step) = (left_jacobian(&phi), 1e-6);
+        for axis in 0..3 {
+            let mut moved = phi;
+            moved[axis] += step;
+            let change = UnitQuaternion::new(moved) * UnitQuaternion::new(phi).inverse();
+            let found = change.scaled_axis() / step;
+            assert!((found - jacobian.column(axis)).norm() < 1e-5, "{axis}");
+        }
+    }
+
+    #[test]
     fn log_inverts_exp() {
         for scale in [1.0, 1e-3, 1e-7, 0.0] {
             let xi = twist() * scale;
@@ -158,8 +212,7 @@ mod tests {
         let from: Vec<Vec3> = (0..10)
             .map(|i| Vec3::new((i as f64).sin(), (i as f64 * 2.0).cos(), i as f64 * 0.1))
             .collect();
-        let to: Vec<Vec3> =
-            from.iter().map(|p| pose.rotation * p + pose.translation.vector).collect();
+        let to: Vec<Vec3> = from.iter().map(|p| transform(&pose, p)).collect();
         let fit = rigid_fit(&from, &to).unwrap();
         assert!(log(&(fit.inverse() * pose)).norm() < 1e-9);
     }

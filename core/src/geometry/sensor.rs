@@ -11,8 +11,9 @@ pub struct SensorRay {
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
-    /// The second eye that must see the point as well (the other camera, or that of the laser), metres.
-    pub witness: Vec3,
+    /// Where the point must be visible from as well (the other camera, or the camera of the laser),
+    /// metres.
+    pub second_viewpoint: Vec3,
 }
 
 /// A pair of cameras side by side along x; the sensor frame is the left one's.
@@ -32,8 +33,8 @@ pub struct StereoModel {
     pub range: [f64; 2],
 }
 
-/// A laser whose fan lies in the xz plane, carried along y by the arm; its camera stands beside it along y. The
-/// sensor frame is the laser's at the middle of the sweep.
+/// A laser whose fan lies in the xz plane, carried along y by the arm; its camera stands beside it
+/// along y. The sensor frame is the laser's at the middle of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StriperModel {
     /// Points of a profile.
@@ -65,8 +66,10 @@ impl StereoModel {
     /// 2 x Allied Vision Guppy Pro F-125 (1292 x 964), matched on a grid of 320 x 240.
     pub const GUPPY: StereoModel = StereoModel {
         grid: [320, 240],
+        // The data sheet of the camera; 40 degrees are those of its lens.
         image: [1292.0, 964.0],
         field_of_view: 40.0 / 180.0 * std::f64::consts::PI,
+        // The setup of the thesis (Wiedemann 2014, ch. 3).
         baseline: 0.1,
         working_distance: 0.65,
         range: [0.4, 1.2],
@@ -79,8 +82,15 @@ impl StereoModel {
 
     /// Direction of the ray through a pixel of the grid, scaled to z = 1.
     pub fn ray(&self, column: f64, row: f64) -> Vec3 {
-        let offset = |at: f64, i: usize| ((at + 0.5) / self.grid[i] as f64 - 0.5) * self.image[i];
-        Vec3::new(offset(column, 0), offset(row, 1), self.focal_length()) / self.focal_length()
+        let (x, y) = (self.image_offset(column, 0), self.image_offset(row, 1));
+        Vec3::new(x, y, self.focal_length()) / self.focal_length()
+    }
+
+    /// Distance of a grid coordinate from the middle of the image, pixels of the image; axis 0 are
+    /// the columns, axis 1 the rows.
+    fn image_offset(&self, coordinate: f64, axis: usize) -> f64 {
+        // Coordinates are those of the middles of the grid's pixels.
+        ((coordinate + 0.5) / self.grid[axis] as f64 - 0.5) * self.image[axis]
     }
 }
 
@@ -125,9 +135,9 @@ impl SensorModel {
         }
     }
 
-    /// Length of the way along y that a scan sweeps, half of it on either side of the sensor frame, metres; 0 if
-    /// the sensor rests.
-    pub fn sweep(&self) -> f64 {
+    /// Length of the way along y that a scan sweeps, half of it on either side of the sensor frame,
+    /// metres; 0 if the sensor rests.
+    pub fn sweep_length(&self) -> f64 {
         match self {
             SensorModel::Stereo(_) => 0.0,
             SensorModel::Striper(s) => (s.profiles - 1) as f64 * s.profile_spacing,
@@ -137,30 +147,36 @@ impl SensorModel {
     /// Rays of a scan, row by row: every `step`-th column of every `step`-th row, centred.
     pub fn rays(&self, step: usize) -> Vec<SensorRay> {
         let step = step.max(1);
-        let along = |count: usize| {
-            let kept = count.div_ceil(step);
-            let first = (count - 1 - (kept - 1) * step) as f64 / 2.0;
-            (0..kept).map(move |i| first + (i * step) as f64)
-        };
         match self {
-            SensorModel::Stereo(s) => along(s.grid[1])
-                .flat_map(|row| along(s.grid[0]).map(move |column| (column, row)))
+            SensorModel::Stereo(s) => thinned_grid(s.grid, step)
                 .map(|(column, row)| SensorRay {
                     origin: Vec3::zeros(),
                     direction: s.ray(column, row).normalize(),
-                    witness: Vec3::x() * s.baseline,
+                    second_viewpoint: Vec3::x() * s.baseline,
                 })
                 .collect(),
-            SensorModel::Striper(s) => along(s.profiles)
-                .flat_map(|row| along(s.points).map(move |column| (column, row)))
+            SensorModel::Striper(s) => thinned_grid([s.points, s.profiles], step)
                 .map(|(column, row)| {
                     let origin = s.origin(row);
-                    let witness = origin - Vec3::y() * s.camera_offset;
-                    SensorRay { origin, direction: s.ray(column), witness }
+                    let second_viewpoint = origin - Vec3::y() * s.camera_offset;
+                    SensorRay { origin, direction: s.ray(column), second_viewpoint }
                 })
                 .collect(),
         }
     }
+}
+
+/// Columns and rows of a grid, row by row: every `step`-th column of every `step`-th row, centred.
+fn thinned_grid(size: [usize; 2], step: usize) -> impl Iterator<Item = (f64, f64)> {
+    thinned_indices(size[1], step)
+        .flat_map(move |row| thinned_indices(size[0], step).map(move |column| (column, row)))
+}
+
+/// Every `step`-th of `count` indices, centred.
+fn thinned_indices(count: usize, step: usize) -> impl Iterator<Item = f64> {
+    let kept = count.div_ceil(step);
+    let first = (count - 1 - (kept - 1) * step) as f64 / 2.0;
+    (0..kept).map(move |i| first + (i * step) as f64)
 }
 
 #[cfg(test)]
@@ -176,12 +192,15 @@ mod tests {
         assert!((sum.normalize() - Vec3::z()).norm() < 1e-12);
         let half = rays[0].direction.x.atan2(rays[0].direction.z).abs().to_degrees();
         assert!((19.5..20.0).contains(&half), "{half}");
+        assert!(rays.iter().all(|r| r.second_viewpoint == Vec3::x() * 0.1));
 
         let striper = SensorModel::Striper(StriperModel::SCANCONTROL);
         let rays = striper.rays(8);
-        assert!((striper.sweep() - 0.24).abs() < 1e-12);
+        assert!((striper.sweep_length() - 0.24).abs() < 1e-12);
         let ends = [rays[0].origin.y, rays[rays.len() - 1].origin.y];
         assert!((ends[0] + ends[1]).abs() < 1e-12 && ends[1] > 0.115, "{ends:?}");
-        assert!(rays.iter().all(|r| (r.witness - r.origin + Vec3::y() * 0.12).norm() < 1e-12));
+        assert!(
+            rays.iter().all(|r| (r.second_viewpoint - r.origin + Vec3::y() * 0.12).norm() < 1e-12)
+        );
     }
 }

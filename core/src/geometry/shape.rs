@@ -30,8 +30,8 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Radius of the smallest sphere about the origin that holds the body, metres.
-    pub fn radius(&self) -> f64 {
+    /// Radius of the smallest sphere about the origin that contains the body, metres.
+    pub fn bounding_radius(&self) -> f64 {
         match *self {
             Shape::Box { half } => half.norm(),
             Shape::Cylinder { radius, half_length } => radius.hypot(half_length),
@@ -96,28 +96,28 @@ impl Solid {
             Shape::Sphere { radius } => (Body::Ball(Ball::new(radius)), UnitQuaternion::identity()),
         };
         let turn = Pose::from_parts(Translation3::identity(), turn);
-        Solid { body, frame_from_body: frame_from_shape * turn, radius: shape.radius() }
+        Solid { body, frame_from_body: frame_from_shape * turn, radius: shape.bounding_radius() }
     }
 
-    /// Radius of the sphere round the body's middle that holds it, metres.
-    pub(crate) fn radius(&self) -> f64 {
+    /// Radius of the sphere about the body's middle that contains it, metres.
+    pub(crate) fn bounding_radius(&self) -> f64 {
         self.radius
     }
 
     /// Where the body is when its frame is at `a_from_frame`.
-    pub(crate) fn place(&self, a_from_frame: &Pose) -> Pose {
+    pub(crate) fn body_pose(&self, a_from_frame: &Pose) -> Pose {
         a_from_frame * self.frame_from_body
     }
 
     /// Distance of the farthest point of the body from the frame's origin, at most, metres.
-    pub(crate) fn reach(&self) -> f64 {
+    pub(crate) fn max_reach(&self) -> f64 {
         self.frame_from_body.translation.vector.norm() + self.radius
     }
 
     /// Distance between two placed bodies (see [`Solid::place`]), metres; 0 if they overlap.
     pub(crate) fn separation(&self, place: &Pose, other: &Solid, other_place: &Pose) -> f64 {
         let (a, b) = (parry_pose(place), parry_pose(other_place));
-        // Unsupported cannot be: every pair of these convex shapes has a distance.
+        // An unsupported pair is impossible: any two of these convex shapes have a distance.
         query::distance(&a, self.shape(), &b, other.shape()).map_or(0.0, |d| d.distance)
     }
 
@@ -133,7 +133,7 @@ impl Solid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Twist, exp};
+    use crate::geometry::{Twist, exp, transform};
 
     fn shapes() -> [Shape; 3] {
         [
@@ -154,10 +154,31 @@ mod tests {
                 let point = Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin());
                 let at = Pose::translation(point.x, point.y, point.z);
                 let there = Solid::new(&dot, &Pose::identity());
-                let found =
-                    solid.separation(&solid.place(&Pose::identity()), &there, &there.place(&at));
+                let found = solid.separation(
+                    &solid.body_pose(&Pose::identity()),
+                    &there,
+                    &there.body_pose(&at),
+                );
                 let expected = shape.distance(&pose.inverse_transform_point(&point.into()).coords);
                 assert!((found - expected).abs() < 1e-5, "{shape:?}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_box_and_sphere_of_a_turned_body_contain_its_points() {
+        let pose = exp(&Twist::new(0.3, -0.2, 0.5, 0.4, -0.9, 0.2));
+        for shape in shapes() {
+            let aabb = shape.aabb(&pose).padded(1e-12);
+            let unit = shape.aabb(&Pose::identity()).max;
+            for i in 0..1000 {
+                let t = f64::from(i);
+                let point =
+                    Vec3::new(t.sin(), (1.7 * t).cos(), (2.3 * t).sin()).component_mul(&unit);
+                if shape.distance(&point) == 0.0 {
+                    assert!(aabb.contains(&transform(&pose, &point)), "{shape:?} {point}");
+                    assert!(point.norm() <= shape.bounding_radius() + 1e-12, "{shape:?} {point}");
+                }
             }
         }
     }
@@ -171,10 +192,10 @@ mod tests {
                 let (a, b_solid) =
                     (Solid::new(&a, &Pose::identity()), Solid::new(&b, &Pose::identity()));
                 let gap = 0.9 - top - b.aabb(&Pose::identity()).max.z;
-                let place = a.place(&Pose::identity());
-                let found = a.separation(&place, &b_solid, &b_solid.place(&pose));
+                let place = a.body_pose(&Pose::identity());
+                let found = a.separation(&place, &b_solid, &b_solid.body_pose(&pose));
                 assert!((found - gap.max(0.0)).abs() < 1e-6, "{found} {gap}");
-                let found = a.separation(&place, &b_solid, &b_solid.place(&Pose::identity()));
+                let found = a.separation(&place, &b_solid, &b_solid.body_pose(&Pose::identity()));
                 assert_eq!(found, 0.0);
             }
         }

@@ -1,4 +1,5 @@
-//! Searches over the triangles of a fixed surface. Only this file and `shape.rs` know parry3d's types.
+//! Searches over the triangles of a fixed surface. Only this file and `shape.rs` know parry3d's
+//! types.
 
 use super::{Aabb, Pose, Vec3};
 use crate::{Error, Result};
@@ -8,6 +9,17 @@ use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::TriMesh;
 
 /// Triangles in a bounding-volume hierarchy.
+///
+/// ```
+/// use puffer_core::geometry::{Surface, Vec3};
+///
+/// let corners = [Vec3::zeros(), Vec3::x(), Vec3::y()];
+/// let surface = Surface::new(&corners, &[[0, 1, 2]])?;
+/// assert_eq!(surface.distance(&Vec3::new(0.2, 0.2, 0.5)), 0.5);
+/// let hit = surface.cast_ray(&Vec3::new(0.2, 0.2, 2.0), &-Vec3::z(), 5.0);
+/// assert_eq!(hit, Some((2.0, 0)));
+/// # Ok::<(), puffer_core::Error>(())
+/// ```
 pub struct Surface {
     mesh: TriMesh,
 }
@@ -88,16 +100,42 @@ fn from_parry(v: Vector) -> Vec3 {
 mod tests {
     use super::*;
 
+    /// Five parallel triangles at z = 0, 1, ... 4, facing upwards.
+    fn stacked_triangles() -> Surface {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let vertices: Vec<Vec3> = (0..15)
+            .map(|i| Vec3::new(corners[i % 3][0], corners[i % 3][1], (i / 3) as f64))
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..5).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        Surface::new(&vertices, &triangles).unwrap()
+    }
+
+    #[test]
+    fn the_nearest_point_lies_inside_on_an_edge_or_at_a_corner() {
+        let surface = stacked_triangles();
+        for (query, expected) in [
+            (Vec3::new(0.2, 0.3, 2.4), Vec3::new(0.2, 0.3, 2.0)),
+            (Vec3::new(0.4, -1.0, 3.0), Vec3::new(0.4, 0.0, 3.0)),
+            (Vec3::new(2.0, -1.0, 5.0), Vec3::new(1.0, 0.0, 4.0)),
+        ] {
+            let found = surface.project(&query);
+            assert!((found.point - expected).norm() < 1e-12, "{query}");
+            assert!((found.distance - (query - expected).norm()).abs() < 1e-12, "{query}");
+            assert_eq!(found.triangle, expected.z as usize);
+            assert!((surface.distance(&query) - found.distance).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn triangles_near_a_box_are_those_whose_boxes_touch_it() {
+        let aabb = Aabb { min: Vec3::new(0.4, 0.4, 0.5), max: Vec3::new(2.0, 2.0, 2.5) };
+        assert_eq!(stacked_triangles().triangles_near(&aabb), [1, 2]);
+        assert!(Surface::new(&[], &[]).is_err());
+    }
+
     #[test]
     fn a_ray_names_the_triangle_that_it_meets_first() {
-        // Five parallel triangles at z = 0, 1, ... 4, facing upwards.
-        let corner = |i: usize| {
-            let (x, y) = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)][i % 3];
-            Vec3::new(x, y, (i / 3) as f64)
-        };
-        let vertices: Vec<Vec3> = (0..15).map(corner).collect();
-        let triangles: Vec<[u32; 3]> = (0..5).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let surface = Surface::new(&vertices, &triangles).unwrap();
+        let surface = stacked_triangles();
         for (z, direction, expected) in
             [(2.5, Vec3::z(), (0.5, 3)), (2.25, -Vec3::z(), (0.25, 2)), (9.0, -Vec3::z(), (5.0, 4))]
         {

@@ -28,14 +28,13 @@ pub(crate) fn sphere(radius: f64, levels: usize) -> Mesh {
         let mut middles = BTreeMap::new();
         let mut cut = Vec::with_capacity(4 * triangles.len());
         for &[a, b, c] in &triangles {
-            let mut middle = |i: u32, j: u32| {
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(i, j): (u32, u32)| {
                 *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
                     let sum = vertices[i as usize] + vertices[j as usize];
                     vertices.push(sum.normalize() * radius);
                     vertices.len() as u32 - 1
                 })
-            };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            });
             cut.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
         }
         triangles = cut;
@@ -51,8 +50,8 @@ pub(crate) fn torus(major: f64, minor: f64, n: u32, m: u32) -> Mesh {
             let (u, v) = (TAU * f64::from(i) / f64::from(n), TAU * f64::from(j) / f64::from(m));
             let ring = major + minor * v.cos();
             mesh.vertices.push(Vec3::new(ring * u.cos(), ring * u.sin(), minor * v.sin()));
-            let at = |a: u32, b: u32| (a % n) * m + b % m;
-            let [p, q, r, s] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let [p, q, r, s] =
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(a, b)| (a % n) * m + b % m);
             mesh.triangles.extend([[p, q, r], [p, r, s]]);
         }
     }
@@ -61,9 +60,9 @@ pub(crate) fn torus(major: f64, minor: f64, n: u32, m: u32) -> Mesh {
 
 /// An axis-aligned box with 12 triangles.
 pub(crate) fn cuboid(min: Vec3, max: Vec3) -> Mesh {
-    let pick = |bit: usize, axis: usize| if bit == 0 { min[axis] } else { max[axis] };
-    let vertices =
-        (0..8).map(|i| Vec3::new(pick(i & 1, 0), pick(i & 2, 1), pick(i & 4, 2))).collect();
+    let vertices = (0..8)
+        .map(|i| Vec3::from_fn(|axis, _| if i >> axis & 1 == 0 { min[axis] } else { max[axis] }))
+        .collect();
     #[rustfmt::skip]
     let triangles = vec![
         [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],

@@ -1,8 +1,8 @@
-//! Single triangles: angles, and an exact test of two for intersection.
+//! Single triangles: their angles, and an exact intersection test of two.
 //!
-//! Signs of volumes and areas come from Shewchuk's adaptive predicates (Shewchuk 1997, Adaptive Precision
-//! Floating-Point Arithmetic and Fast Robust Geometric Predicates), so no answer depends on rounding.
-//! Triangles are closed sets: touching counts as intersecting.
+//! Signs of volumes and areas come from Shewchuk's adaptive predicates (Shewchuk 1997, Adaptive
+//! Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates), so no answer depends
+//! on rounding. Triangles are closed sets: touching counts as intersecting.
 
 use crate::geometry::Vec3;
 use robust::{Coord, Coord3D};
@@ -18,54 +18,58 @@ pub fn triangle_angles(corners: &[Vec3; 3]) -> [f64; 3] {
 
 /// Whether two triangles share at least one point, exactly (they may be degenerate).
 ///
-/// Two triangles that share a point share one on an edge of either. For a pair in which a degenerate triangle
-/// is involved the answer is conservative: it may be true for two that only come close.
+/// Two triangles that share a point share one that lies on an edge of either. For pairs with a
+/// degenerate triangle the answer is conservative: it may be true for two that only come close.
 pub fn triangles_intersect(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
-    !strictly_on_one_side(a, b)
-        && !strictly_on_one_side(b, a)
-        && (edges(a).any(|[p, q]| segment_meets_triangle(&p, &q, b))
-            || edges(b).any(|[p, q]| segment_meets_triangle(&p, &q, a)))
+    !lies_strictly_on_one_side(a, b)
+        && !lies_strictly_on_one_side(b, a)
+        && (edges(a).any(|[p, q]| segment_intersects_triangle(&p, &q, b))
+            || edges(b).any(|[p, q]| segment_intersects_triangle(&p, &q, a)))
 }
 
-/// Whether two triangles that have the corner `s` in common, (s, a0, a1) and (s, b0, b1), share another point.
+/// Whether two triangles that have the corner `s` in common, (s, a0, a1) and (s, b0, b1), share
+/// another point.
 ///
-/// From s the common set runs to where it leaves one of the two, and from s that is through the opposite edge.
-pub(crate) fn meet_beyond_corner(s: &Vec3, a: &[Vec3; 2], b: &[Vec3; 2]) -> bool {
+/// The common set is a segment from s to where it leaves one of the two triangles, which is through
+/// the edge opposite of s.
+pub(crate) fn intersect_beyond_shared_vertex(s: &Vec3, a: &[Vec3; 2], b: &[Vec3; 2]) -> bool {
     let first = [*s, a[0], a[1]];
     let second = [*s, b[0], b[1]];
-    let apart = |plane: &[Vec3; 3], edge: &[Vec3; 2]| {
-        volume(plane, &edge[0]) * volume(plane, &edge[1]) > 0.0
-    };
-    !apart(&first, b)
-        && !apart(&second, a)
-        && (segment_meets_triangle(&a[0], &a[1], &second)
-            || segment_meets_triangle(&b[0], &b[1], &first))
+    !is_edge_on_one_side(&first, b)
+        && !is_edge_on_one_side(&second, a)
+        && (segment_intersects_triangle(&a[0], &a[1], &second)
+            || segment_intersects_triangle(&b[0], &b[1], &first))
 }
 
-/// Whether two triangles that have the edge u v in common, (u, v, p) and (u, v, q), share a point beside it:
-/// only if one folds back onto the other in its plane.
-pub(crate) fn meet_beyond_edge(u: &Vec3, v: &Vec3, p: &Vec3, q: &Vec3) -> bool {
-    if volume(&[*u, *v, *p], q) != 0.0 {
+/// Whether both ends of `edge` lie strictly on the same side of the triangle's plane.
+fn is_edge_on_one_side(plane: &[Vec3; 3], edge: &[Vec3; 2]) -> bool {
+    orient_3d(plane, &edge[0]) * orient_3d(plane, &edge[1]) > 0.0
+}
+
+/// Whether two triangles that have the edge u v in common, (u, v, p) and (u, v, q), share a point
+/// beside it. They do only if one folds back onto the other in the same plane.
+pub(crate) fn overlap_beyond_shared_edge(u: &Vec3, v: &Vec3, p: &Vec3, q: &Vec3) -> bool {
+    if orient_3d(&[*u, *v, *p], q) != 0.0 {
         return false;
     }
-    // In each projection that keeps the plane's points apart the sides are the true ones; the others give 0.
-    let mut same = false;
+    // A projection that maps the plane one-to-one preserves the sides; the others give 0.
+    let mut on_same_side = false;
     for axis in 0..3 {
         let [u, v, p, q] = [u, v, p, q].map(|x| project(x, axis));
-        let sides = area(u, v, p) * area(u, v, q);
+        let sides = orient_2d(u, v, p) * orient_2d(u, v, q);
         if sides < 0.0 {
             return false;
         }
-        same |= sides > 0.0;
+        on_same_side |= sides > 0.0;
     }
-    same || (collinear(&[*u, *v, *p]) && collinear(&[*u, *v, *q]))
+    on_same_side || (are_collinear(&[*u, *v, *p]) && are_collinear(&[*u, *v, *q]))
 }
 
-/// Whether the corners lie on one line or in one point, exactly.
-pub(crate) fn collinear(corners: &[Vec3; 3]) -> bool {
+/// Whether the corners lie on one line or in one point; the answer is exact.
+pub(crate) fn are_collinear(corners: &[Vec3; 3]) -> bool {
     (0..3).all(|axis| {
         let [a, b, c] = [0, 1, 2].map(|i| project(&corners[i], axis));
-        area(a, b, c) == 0.0
+        orient_2d(a, b, c) == 0.0
     })
 }
 
@@ -74,67 +78,81 @@ fn edges(t: &[Vec3; 3]) -> impl Iterator<Item = [Vec3; 2]> {
     (0..3).map(move |i| [t[i], t[(i + 1) % 3]])
 }
 
-fn strictly_on_one_side(plane: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
-    let sides = [0, 1, 2].map(|i| volume(plane, &other[i]));
+fn lies_strictly_on_one_side(plane: &[Vec3; 3], other: &[Vec3; 3]) -> bool {
+    let sides = [0, 1, 2].map(|i| orient_3d(plane, &other[i]));
     sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0)
 }
 
-fn segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
-    let (at_p, at_q) = (sign(volume(t, p)), sign(volume(t, q)));
+fn segment_intersects_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
+    let (at_p, at_q) = (sign(orient_3d(t, p)), sign(orient_3d(t, q)));
     if at_p * at_q > 0 {
         return false;
     }
     if at_p == 0 && at_q == 0 {
-        return coplanar_segment_meets_triangle(p, q, t);
+        return coplanar_segment_intersects_triangle(p, q, t);
     }
-    // The line p q passes all three edges on the same side.
-    let mut seen = [false; 3];
+    // The line p q meets the triangle if it passes all three edges on the same side.
+    let (mut passes_left, mut passes_right) = (false, false);
     for i in 0..3 {
-        seen[(1 + sign(volume(&[*p, *q, t[i]], &t[(i + 1) % 3]))) as usize] = true;
+        match sign(orient_3d(&[*p, *q, t[i]], &t[(i + 1) % 3])) {
+            1 => passes_left = true,
+            -1 => passes_right = true,
+            _ => {}
+        }
     }
-    !(seen[0] && seen[2])
+    !(passes_left && passes_right)
 }
 
-/// A projection along an axis keeps common points common, and is one-to-one on the plane for at least one axis,
-/// so that the sets meet if and only if they meet in all three projections.
-fn coplanar_segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
+/// Projections along the axes keep common points common, and at least one of them is one-to-one on
+/// the plane. The sets intersect if and only if they intersect in all three projections.
+fn coplanar_segment_intersects_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     (0..3).all(|axis| {
         let (p, q) = (project(p, axis), project(q, axis));
         let t = [0, 1, 2].map(|i| project(&t[i], axis));
-        point_in_triangle(p, &t)
-            || point_in_triangle(q, &t)
-            || (0..3).any(|i| segments_meet(p, q, t[i], t[(i + 1) % 3]))
+        is_point_in_triangle(p, &t)
+            || is_point_in_triangle(q, &t)
+            || (0..3).any(|i| segments_intersect(p, q, t[i], t[(i + 1) % 3]))
     })
 }
 
-fn point_in_triangle(p: Coord<f64>, t: &[Coord<f64>; 3]) -> bool {
-    let inside_box = |get: fn(&Coord<f64>) -> f64| {
-        let values = t.each_ref().map(get);
-        let (low, high) =
-            (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
-        low <= get(&p) && get(&p) <= high
-    };
-    let signs = [0, 1, 2].map(|i| sign(area(t[i], t[(i + 1) % 3], p)));
-    inside_box(|c| c.x) && inside_box(|c| c.y) && !(signs.contains(&1) && signs.contains(&-1))
+fn is_point_in_triangle(p: Coord<f64>, t: &[Coord<f64>; 3]) -> bool {
+    let signs = [0, 1, 2].map(|i| sign(orient_2d(t[i], t[(i + 1) % 3], p)));
+    is_within_range(p.x, t.map(|c| c.x))
+        && is_within_range(p.y, t.map(|c| c.y))
+        && !(signs.contains(&1) && signs.contains(&-1))
 }
 
-fn segments_meet(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>, d: Coord<f64>) -> bool {
-    let overlap = |a: f64, b: f64, c: f64, d: f64| a.min(b) <= c.max(d) && c.min(d) <= a.max(b);
-    overlap(a.x, b.x, c.x, d.x)
-        && overlap(a.y, b.y, c.y, d.y)
-        && sign(area(a, b, c)) * sign(area(a, b, d)) <= 0
-        && sign(area(c, d, a)) * sign(area(c, d, b)) <= 0
+fn segments_intersect(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>, d: Coord<f64>) -> bool {
+    do_ranges_overlap([a.x, b.x], [c.x, d.x])
+        && do_ranges_overlap([a.y, b.y], [c.y, d.y])
+        && sign(orient_2d(a, b, c)) * sign(orient_2d(a, b, d)) <= 0
+        && sign(orient_2d(c, d, a)) * sign(orient_2d(c, d, b)) <= 0
 }
 
-fn volume(t: &[Vec3; 3], p: &Vec3) -> f64 {
+/// Whether `value` lies between the smallest and the largest of `values`.
+fn is_within_range(value: f64, values: [f64; 3]) -> bool {
+    let low = values[0].min(values[1]).min(values[2]);
+    let high = values[0].max(values[1]).max(values[2]);
+    low <= value && value <= high
+}
+
+/// Whether the intervals between the two pairs of numbers share a number.
+fn do_ranges_overlap([a, b]: [f64; 2], [c, d]: [f64; 2]) -> bool {
+    a.min(b) <= c.max(d) && c.min(d) <= a.max(b)
+}
+
+/// Sign of the volume of the tetrahedron (t, p): the side of the triangle's plane on which p lies.
+fn orient_3d(t: &[Vec3; 3], p: &Vec3) -> f64 {
     let [a, b, c, d] = [&t[0], &t[1], &t[2], p].map(|v| Coord3D { x: v.x, y: v.y, z: v.z });
     robust::orient3d(a, b, c, d)
 }
 
-fn area(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>) -> f64 {
+/// Sign of the area of the triangle (a, b, c): positive if counter-clockwise.
+fn orient_2d(a: Coord<f64>, b: Coord<f64>, c: Coord<f64>) -> f64 {
     robust::orient2d(a, b, c)
 }
 
+/// The point without its coordinate along `axis`.
 fn project(v: &Vec3, axis: usize) -> Coord<f64> {
     Coord { x: v[(axis + 1) % 3], y: v[(axis + 2) % 3] }
 }
@@ -151,6 +169,15 @@ mod tests {
 
     fn triangle(corners: [[f64; 3]; 3]) -> [Vec3; 3] {
         corners.map(Vec3::from)
+    }
+
+    /// The corners in the plane z = x + y.
+    fn tilt(corners: [[f64; 3]; 3]) -> [Vec3; 3] {
+        corners.map(|[x, y, _]| Vec3::new(x, y, x + y))
+    }
+
+    fn edge_in_plane(y0: f64, y1: f64) -> [Vec3; 2] {
+        [Vec3::new(1.0, y0, 0.0), Vec3::new(1.0, y1, 0.0)]
     }
 
     fn meets_flat(corners: [[f64; 3]; 3]) -> bool {
@@ -179,7 +206,6 @@ mod tests {
         assert!(!meets_flat([[1.1, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]));
         assert!(!meets_flat([[0.6, 0.6, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]));
         // A tilted plane, shifted by a power of two so that no rounding occurs.
-        let tilt = |c: [[f64; 3]; 3]| c.map(|[x, y, _]| Vec3::new(x, y, x + y));
         let inner = tilt([[0.25, 0.25, 0.0], [0.5, 0.25, 0.0], [0.25, 0.5, 0.0]]);
         let outer = tilt([[1.25, 0.25, 0.0], [1.5, 0.25, 0.0], [1.25, 0.5, 0.0]]);
         assert!(triangles_intersect(&tilt(FLAT), &inner));
@@ -195,9 +221,9 @@ mod tests {
     #[test]
     fn a_fold_onto_the_neighbour_counts_but_a_flat_neighbour_does_not() {
         let [u, v, p] = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0]]);
-        assert!(meet_beyond_edge(&u, &v, &p, &Vec3::new(0.7, 0.3, 0.0)));
-        assert!(!meet_beyond_edge(&u, &v, &p, &Vec3::new(0.7, -0.3, 0.0)));
-        assert!(!meet_beyond_edge(&u, &v, &p, &Vec3::new(0.7, 0.3, 1e-18)));
+        assert!(overlap_beyond_shared_edge(&u, &v, &p, &Vec3::new(0.7, 0.3, 0.0)));
+        assert!(!overlap_beyond_shared_edge(&u, &v, &p, &Vec3::new(0.7, -0.3, 0.0)));
+        assert!(!overlap_beyond_shared_edge(&u, &v, &p, &Vec3::new(0.7, 0.3, 1e-18)));
     }
 
     #[test]
@@ -206,13 +232,12 @@ mod tests {
         let a = [Vec3::new(1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0)];
         let away = [Vec3::new(-1.0, 0.0, -1.0), Vec3::new(-1.0, 0.0, 1.0)];
         let through = [Vec3::new(2.0, 0.0, -1.0), Vec3::new(2.0, 0.0, 1.0)];
-        assert!(!meet_beyond_corner(&s, &a, &away));
-        assert!(meet_beyond_corner(&s, &a, &through));
+        assert!(!intersect_beyond_shared_vertex(&s, &a, &away));
+        assert!(intersect_beyond_shared_vertex(&s, &a, &through));
         // In one plane: side by side with a gap, touching along an edge's line, overlapping.
-        let flat = |y0: f64, y1: f64| [Vec3::new(1.0, y0, 0.0), Vec3::new(1.0, y1, 0.0)];
-        assert!(!meet_beyond_corner(&s, &a, &flat(2.0, 3.0)));
-        assert!(meet_beyond_corner(&s, &a, &flat(1.0, 3.0)));
-        assert!(meet_beyond_corner(&s, &a, &flat(0.5, 3.0)));
+        assert!(!intersect_beyond_shared_vertex(&s, &a, &edge_in_plane(2.0, 3.0)));
+        assert!(intersect_beyond_shared_vertex(&s, &a, &edge_in_plane(1.0, 3.0)));
+        assert!(intersect_beyond_shared_vertex(&s, &a, &edge_in_plane(0.5, 3.0)));
     }
 
     #[test]

@@ -3,93 +3,101 @@
 use crate::geometry::Vec3;
 use crate::mesh::{HalfEdgeMesh, Mesh, self_intersections, self_intersections_among};
 
-/// Rounds of taking moves back before the whole step is given up; each widens what is taken back by a ring.
-const ROUNDS: usize = 6;
+/// Rounds in which moves are taken back before the whole step is given up; each takes back the
+/// moves of one more ring of neighbours.
+const MAX_ROUNDS: usize = 6;
+/// Rings of neighbours of an intersection that an edit must leave alone: a vertex that the edit
+/// added stands for its older neighbours.
+const FROZEN_RINGS: usize = 2;
 
-/// Moves each vertex to its target. Where triangles then cut each other, their vertices go back to where they
-/// were, and then their neighbours', until nothing cuts; a mesh free of self-intersections stays so.
-/// Returns the number of vertices that were held back.
+/// Moves each vertex to its target (metres). Where triangles then intersect, their vertices go back
+/// to where they were, and in further rounds their neighbours, until nothing intersects; a mesh
+/// free of self-intersections stays so. Returns the number of vertices that were held back.
 pub(super) fn move_guarded(mesh: &mut HalfEdgeMesh, targets: &[Vec3]) -> usize {
-    let before = std::mem::replace(&mut mesh.positions, targets.iter().map(stored).collect());
-    let mut snapshot = mesh.snapshot();
-    let mut cut = self_intersections(&snapshot);
+    let before =
+        std::mem::replace(&mut mesh.positions, targets.iter().map(to_single_precision).collect());
+    let mut snapshot = mesh.to_mesh();
+    let mut intersections = self_intersections(&snapshot);
     let mut held = vec![false; before.len()];
-    for round in 0..ROUNDS {
-        if cut.is_empty() {
+    for round in 0..MAX_ROUNDS {
+        if intersections.is_empty() {
             return held.iter().filter(|h| **h).count();
         }
-        let mut back = involved(&snapshot, &cut);
+        let mut back = intersecting_vertices(&snapshot, &intersections);
         for _ in 0..round {
-            back = widened(mesh, &back);
+            back = with_neighbours(mesh, &back);
         }
         for &v in &back {
             held[v as usize] = true;
             mesh.positions[v as usize] = before[v as usize];
         }
         snapshot.vertices.clone_from(&mesh.positions);
-        cut = self_intersections_among(&snapshot, &triangles_of(&snapshot, &back));
+        intersections = self_intersections_among(&snapshot, &triangles_at(&snapshot, &back));
     }
-    if !cut.is_empty() {
+    if !intersections.is_empty() {
         mesh.positions = before;
         return targets.len();
     }
     held.iter().filter(|h| **h).count()
 }
 
-/// The position as a mesh file keeps it, in single precision: what is checked here must hold for what is read.
-pub(super) fn stored(position: &Vec3) -> Vec3 {
+/// The position as a mesh file holds it: what is checked here must be true of what is read.
+fn to_single_precision(position: &Vec3) -> Vec3 {
     position.map(|v| f64::from(v as f32))
 }
 
 /// Vertices of the triangles in `pairs`, ascending.
-pub(super) fn involved(mesh: &Mesh, pairs: &[(u32, u32)]) -> Vec<u32> {
+fn intersecting_vertices(mesh: &Mesh, pairs: &[(u32, u32)]) -> Vec<u32> {
     let triangles = pairs.iter().flat_map(|&(a, b)| [a, b]);
-    sorted(triangles.flat_map(|t| mesh.triangles[t as usize]).collect())
+    sorted_unique(triangles.flat_map(|t| mesh.triangles[t as usize]).collect())
 }
 
-fn widened(mesh: &HalfEdgeMesh, vertices: &[u32]) -> Vec<u32> {
-    let rings = vertices.iter().flat_map(|&v| mesh.neighbours(v).chain([v]));
-    sorted(rings.collect())
+/// `vertices` and their neighbours, ascending.
+fn with_neighbours(mesh: &HalfEdgeMesh, vertices: &[u32]) -> Vec<u32> {
+    let rings = vertices.iter().flat_map(|&v| mesh.one_ring(v).chain([v]));
+    sorted_unique(rings.collect())
 }
 
-fn triangles_of(mesh: &Mesh, vertices: &[u32]) -> Vec<u32> {
+/// The triangles that have at least one of `vertices`, ascending.
+fn triangles_at(mesh: &Mesh, vertices: &[u32]) -> Vec<u32> {
     let mut marked = vec![false; mesh.vertices.len()];
     vertices.iter().for_each(|&v| marked[v as usize] = true);
-    let touched = |t: &u32| mesh.triangles[*t as usize].iter().any(|&v| marked[v as usize]);
-    (0..mesh.triangles.len() as u32).filter(touched).collect()
+    (0..mesh.triangles.len() as u32)
+        .filter(|&t| mesh.triangles[t as usize].iter().any(|&v| marked[v as usize]))
+        .collect()
 }
 
-fn sorted(mut vertices: Vec<u32>) -> Vec<u32> {
+fn sorted_unique(mut vertices: Vec<u32>) -> Vec<u32> {
     vertices.sort_unstable();
     vertices.dedup();
     vertices
 }
 
-/// Applies `edit` (splits, collapses, flips), which takes the mesh and the vertices it must leave alone. Where
-/// the outcome cuts itself it is taken back and tried again with the vertices there frozen; at last all are. Vertices
+/// Applies `edit` (splits, collapses, flips), which takes the mesh and tells by a function which
+/// vertices it must leave alone. Where the outcome intersects itself it is taken back and tried
+/// again with the vertices there frozen; if that does not help, the mesh stays as it is. Vertices
 /// and triangles that were removed leave no gaps.
 pub(super) fn edit_guarded(
     mesh: &mut HalfEdgeMesh,
     edit: impl Fn(&mut HalfEdgeMesh, &dyn Fn(u32) -> bool),
 ) {
     let mut frozen = vec![false; mesh.positions.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut edited = mesh.clone();
-        // Vertices that a split adds are younger than the list: free.
+        // Vertices that a split adds are not in the list, and free.
         edit(&mut edited, &|v| frozen.get(v as usize).copied().unwrap_or(false));
-        edited.positions.iter_mut().for_each(|p| *p = stored(p));
-        let snapshot = edited.snapshot();
-        let cut = self_intersections(&snapshot);
-        if cut.is_empty() {
+        edited.positions.iter_mut().for_each(|p| *p = to_single_precision(p));
+        let snapshot = edited.to_mesh();
+        let intersections = self_intersections(&snapshot);
+        if intersections.is_empty() {
             *mesh = edited.compacted();
             return;
         }
-        let mut guilty = involved(&snapshot, &cut);
-        // A guilty vertex younger than the list stands for its older neighbours.
-        for _ in 0..2 {
-            guilty = widened(&edited, &guilty);
+        let mut to_freeze = intersecting_vertices(&snapshot, &intersections);
+        for _ in 0..FROZEN_RINGS {
+            to_freeze = with_neighbours(&edited, &to_freeze);
         }
-        for v in guilty {
+        for v in to_freeze {
             if let Some(frozen) = frozen.get_mut(v as usize) {
                 *frozen = true;
             }
@@ -116,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edit_that_cuts_is_done_without_the_guilty_vertices() {
+    fn an_edit_that_makes_intersections_is_done_without_their_vertices() {
         let shape = test_shapes::sphere(1.0, 3);
         let mut mesh = HalfEdgeMesh::new(&shape).unwrap();
         edit_guarded(&mut mesh, |mesh, frozen| {
@@ -126,8 +134,8 @@ mod tests {
                 }
             }
         });
-        assert!(self_intersections(&mesh.snapshot()).is_empty());
-        assert_eq!(mesh.positions[7], stored(&shape.vertices[7]));
-        assert_eq!(mesh.positions[30], stored(&(shape.vertices[30] * 1.02)));
+        assert!(self_intersections(&mesh.to_mesh()).is_empty());
+        assert_eq!(mesh.positions[7], to_single_precision(&shape.vertices[7]));
+        assert_eq!(mesh.positions[30], to_single_precision(&(shape.vertices[30] * 1.02)));
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::geometry::Vec3;
 use crate::mesh::{
     components, genus, is_closed, is_oriented, is_two_manifold, self_intersections, test_shapes,
 };
@@ -66,17 +67,19 @@ fn a_hole_in_the_data_is_closed_and_marked() {
     assert!(lowest > -0.055, "{lowest}");
 }
 
+/// Signed distance from two balls of 22 mm, 60 mm apart, with a neck of 5 mm between them.
+fn dumbbell(p: &Vec3) -> f64 {
+    let middle = Vec3::new(0.0, 0.0, 0.03);
+    let ball = (p - middle).norm().min((p + middle).norm()) - 0.022;
+    let neck = (p.x.hypot(p.y) - 0.005).max(p.z.abs() - 0.03);
+    ball.min(neck)
+}
+
 #[test]
 fn two_balls_joined_by_a_thin_neck_stay_one() {
-    let field = |p: &Vec3| {
-        let ball =
-            (p - Vec3::new(0.0, 0.0, 0.03)).norm().min((p + Vec3::new(0.0, 0.0, 0.03)).norm())
-                - 0.022;
-        let neck = (p.x.hypot(p.y) - 0.005).max(p.z.abs() - 0.03);
-        ball.min(neck)
-    };
     let bounds = crate::geometry::Aabb { min: Vec3::repeat(-0.06), max: Vec3::repeat(0.06) };
-    let shape = crate::mesh::isosurface::Lattice::sample(&bounds, 0.0015, field).surface();
+    let shape =
+        crate::mesh::isosurface::Lattice::sample(&bounds, 0.0015, dumbbell).extract_isosurface();
     assert_watertight(&run(&cloud_on(&shape, 0.0015), &ReconstructParams::default()), 0);
 }
 
@@ -100,17 +103,17 @@ fn the_thesis_inflates_and_details_a_sphere() {
     assert!(rms < 1e-3, "{rms}");
 }
 
+/// The error for a cloud that no mesh can be made of.
+fn refuse(cloud: &Cloud) -> String {
+    reconstruct(cloud, &ReconstructParams::default(), &Progress::silent()).unwrap_err().to_string()
+}
+
 #[test]
 fn planes_and_handfuls_are_refused() {
     let mut plane = Cloud::default();
     for i in 0..400 {
         plane.push(Vec3::new(f64::from(i % 20), f64::from(i / 20), 0.0) * 1e-3, Vec3::z(), 1e-4, 1);
     }
-    let refuse = |cloud: &Cloud| {
-        reconstruct(cloud, &ReconstructParams::default(), &Progress::silent())
-            .unwrap_err()
-            .to_string()
-    };
     assert!(refuse(&plane).contains("plane"));
     assert!(refuse(&plane.select(&[1, 2, 3])).contains("3 usable points"));
     assert!(refuse(&Cloud::default()).contains("0 usable points"));
@@ -125,12 +128,12 @@ fn planes_and_handfuls_are_refused() {
 #[test]
 fn one_and_two_threads_give_the_same_bits() {
     let cloud = cloud_on(&test_shapes::torus(0.05, 0.018, 60, 30), 0.003);
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| run(&cloud, &ReconstructParams::default()))
-    };
     // As text, where a vertex without standard deviation equals itself.
-    assert!(format!("{:?}", with(1)) == format!("{:?}", with(2)), "not the same bits");
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        format!("{:?}", pool.install(|| run(&cloud, &ReconstructParams::default())))
+    });
+    assert!(one == two, "not the same bits");
 }
 
 #[test]
@@ -160,31 +163,33 @@ fn an_object_on_a_table_gets_its_flat_underside_and_nobody_claims_to_have_seen_i
     assert!((mesh.volume() / expected - 1.0).abs() < 0.01, "{}", mesh.volume() / expected);
 }
 
+/// Signed distance from a box about the origin with these half edges.
+fn box_distance(p: &Vec3, half: Vec3) -> f64 {
+    let q = p.abs() - half;
+    q.map(|v| v.max(0.0)).norm() + q.max().min(0.0)
+}
+
 /// A box of 60 x 40 x 20 mm, open at the top, with walls of `wall` metres.
 fn tray(wall: f64) -> Mesh {
-    let field = |p: &Vec3| {
-        let outside = |half: Vec3, at: Vec3| {
-            let q = (p - at).abs() - half;
-            q.map(|v| v.max(0.0)).norm() + q.max().min(0.0)
-        };
-        let outer = outside(Vec3::new(0.03, 0.02, 0.01), Vec3::zeros());
-        let inner = Vec3::new(0.03 - wall, 0.02 - wall, 0.01);
-        outer.max(-outside(inner, Vec3::z() * wall))
-    };
     let half = Vec3::new(0.035, 0.025, 0.015);
     let bounds = crate::geometry::Aabb { min: -half, max: half };
-    crate::mesh::isosurface::Lattice::sample(&bounds, 0.0007, field).surface()
+    crate::mesh::isosurface::Lattice::sample(&bounds, 0.0007, |p| {
+        let outer = box_distance(p, Vec3::new(0.03, 0.02, 0.01));
+        let inner = Vec3::new(0.03 - wall, 0.02 - wall, 0.01);
+        outer.max(-box_distance(&(p - Vec3::z() * wall), inner))
+    })
+    .extract_isosurface()
 }
 
 /// Points of `cloud` of which no two of one side lie nearer than `spacing` (metres).
 fn thinned(cloud: &Cloud, spacing: f64) -> Cloud {
     let mut kept: Vec<usize> = Vec::new();
     for i in 0..cloud.len() {
-        let near = |&j: &usize| {
+        let is_near_kept = kept.iter().any(|&j| {
             (cloud.points[i] - cloud.points[j]).norm() < spacing
                 && cloud.normals[i].dot(&cloud.normals[j]) > 0.5
-        };
-        if !kept.iter().any(near) {
+        });
+        if !is_near_kept {
             kept.push(i);
         }
     }

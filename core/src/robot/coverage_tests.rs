@@ -4,26 +4,29 @@ use super::tests::{cell, object, view};
 use super::*;
 use crate::geometry::{SensorModel, StereoModel, StriperModel, Vec3};
 
-/// Share of the directions at these elevations (degrees, every 20 degrees of azimuth) that are reached from home.
+/// Share of the directions at these elevations (degrees, every 20 degrees of azimuth) that are
+/// reached from home.
 fn coverage(setup: &str, sensor: &SensorModel, elevations: &[f64]) -> f64 {
-    let (cell, home, obstacle) = (cell(setup), home(setup).unwrap(), object());
+    let (cell, home, obstacle) = (cell(setup), home_configuration(setup).unwrap(), object());
     let (mut reached, mut asked) = (0, 0);
     for elevation in elevations {
         for azimuth in (0..360).step_by(20) {
             let (e, a) = (elevation.to_radians(), f64::from(azimuth).to_radians());
             let direction = Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
-            let request = ReachRequest {
+            let request = ReachabilityRequest {
                 view: view(&direction, sensor.working_distance()),
                 start: &home,
-                sweep: sensor.sweep(),
+                sweep: sensor.sweep_length(),
                 slide: slide_range(sensor, 0.15),
                 obstacle: &obstacle,
                 margin: 0.01,
             };
             asked += 1;
-            match cell.reach(&request).unwrap() {
-                Reach::Reached(_) => reached += 1,
-                Reach::Refused { reason, .. } => println!("{elevation} {azimuth}: {reason}"),
+            match cell.check_reachability(&request).unwrap() {
+                Reachability::Reachable(_) => reached += 1,
+                Reachability::Unreachable { reason, .. } => {
+                    println!("{elevation} {azimuth}: {reason}")
+                }
             }
         }
     }

@@ -1,8 +1,11 @@
-//! A robot as a tree of links: poses of all of them for given joint positions.
+//! A robot as a tree of links, with its forward kinematics.
 
 use crate::geometry::{Pose, Shape, Vec3};
 use crate::{Error, Result};
 use nalgebra::{Translation3, Unit, UnitQuaternion};
+
+/// A position that rounding has put this far beyond a limit is still within it, radians or metres.
+const LIMIT_TOLERANCE: f64 = 1e-9;
 
 /// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +31,13 @@ pub struct Joint {
     pub velocity: f64,
 }
 
+impl Joint {
+    fn is_beyond_limits(&self, position: f64) -> bool {
+        let [low, high] = self.limits;
+        position < low - LIMIT_TOLERANCE || position > high + LIMIT_TOLERANCE
+    }
+}
+
 /// A collision body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkShape {
@@ -35,7 +45,7 @@ pub struct LinkShape {
     pub link: usize,
     /// The body.
     pub shape: Shape,
-    /// Its place.
+    /// Its pose in the frame of the link.
     pub link_from_shape: Pose,
 }
 
@@ -48,8 +58,8 @@ pub struct RobotModel {
     pub(super) shapes: Vec<LinkShape>,
     /// Parents before children.
     pub(super) edges: Vec<Edge>,
-    /// The edge above each link; none above the root.
-    pub(super) above: Vec<Option<usize>>,
+    /// The edge to the parent of each link; none for the root.
+    pub(super) parent_edge: Vec<Option<usize>>,
 }
 
 /// A joint of any kind between two links.
@@ -58,30 +68,32 @@ pub(super) struct Edge {
     pub parent: usize,
     pub child: usize,
     pub parent_from_joint: Pose,
-    pub motion: Option<Motion>,
+    pub motion: Option<JointMotion>,
 }
 
-/// How an edge follows a joint: its position is `factor * q[joint] + offset`.
+/// How an edge follows a joint: its position is `multiplier * q[joint] + offset`, as for a mimic
+/// joint of URDF; for any other joint the multiplier is 1 and the offset 0.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
+pub(super) struct JointMotion {
     pub axis: Unit<Vec3>,
-    pub slides: bool,
+    pub is_prismatic: bool,
     pub joint: usize,
-    pub factor: f64,
+    pub multiplier: f64,
     pub offset: f64,
 }
 
-impl Motion {
-    /// The displacement for the position `q` of the joint that it follows.
+impl JointMotion {
+    /// The pose behind the joint in the frame in front of it, for the position `q` of the joint
+    /// that it follows, radians or metres.
     pub(super) fn displacement(&self, q: f64) -> Pose {
-        let at = self.factor * q + self.offset;
-        if self.slides {
+        let position = self.multiplier * q + self.offset;
+        if self.is_prismatic {
             Pose::from_parts(
-                Translation3::from(self.axis.into_inner() * at),
+                Translation3::from(self.axis.into_inner() * position),
                 UnitQuaternion::identity(),
             )
         } else {
-            let turn = UnitQuaternion::from_axis_angle(&self.axis, at);
+            let turn = UnitQuaternion::from_axis_angle(&self.axis, position);
             Pose::from_parts(Translation3::identity(), turn)
         }
     }
@@ -93,7 +105,8 @@ impl RobotModel {
         &self.name
     }
 
-    /// The joints that can be commanded, in the order of the description. Joint vectors have this order.
+    /// The joints that can be commanded, in the order of the description. Joint positions are in
+    /// this order everywhere.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
     }
@@ -118,11 +131,11 @@ impl RobotModel {
         })
     }
 
-    /// Checks a joint vector: its length, and that all numbers are finite.
+    /// Checks joint positions: their number, and that all are finite.
     ///
     /// # Errors
     /// [`Error::Input`] that names the joint.
-    pub fn check(&self, q: &[f64]) -> Result<()> {
+    pub fn check_configuration(&self, q: &[f64]) -> Result<()> {
         if q.len() != self.joints.len() {
             return Err(Error::input(format!(
                 "{} joint positions given, but the robot `{}` has {} joints",
@@ -140,16 +153,13 @@ impl RobotModel {
     }
 
     /// The first joint whose position lies outside its limits.
-    pub fn beyond_limits(&self, q: &[f64]) -> Option<&Joint> {
-        let outside = |joint: &Joint, q: f64| {
-            q < joint.limits[0] - LIMIT_SLACK || q > joint.limits[1] + LIMIT_SLACK
-        };
-        self.joints.iter().zip(q).find(|(joint, q)| outside(joint, **q)).map(|(joint, _)| joint)
+    pub fn joint_beyond_limits(&self, q: &[f64]) -> Option<&Joint> {
+        self.joints.iter().zip(q).find(|(joint, q)| joint.is_beyond_limits(**q)).map(|(j, _)| j)
     }
 
-    /// Pose `root_from_link` of every link, in the order of [`RobotModel::link_names`]. A joint that `q` has no
-    /// number for counts as 0.
-    pub fn forward(&self, q: &[f64]) -> Vec<Pose> {
+    /// Forward kinematics: the pose `root_from_link` of every link, in the order of
+    /// [`RobotModel::link_names`]. A joint for which `q` is too short is at 0.
+    pub fn forward_kinematics(&self, q: &[f64]) -> Vec<Pose> {
         let mut poses = vec![Pose::identity(); self.link_names.len()];
         for edge in &self.edges {
             let mut pose = poses[edge.parent] * edge.parent_from_joint;
@@ -161,23 +171,25 @@ impl RobotModel {
         poses
     }
 
-    /// The transform `a_from_b` between two links.
+    /// The pose `a_from_b` of link `b` in the frame of link `a`.
     ///
     /// # Errors
     /// [`Error::Input`] if there is no such link or `q` does not fit the joints.
     pub fn pose(&self, q: &[f64], a: &str, b: &str) -> Result<Pose> {
-        self.check(q)?;
+        self.check_configuration(q)?;
         let (a, b) = (self.link(a)?, self.link(b)?);
-        let poses = self.forward(q);
+        let poses = self.forward_kinematics(q);
         Ok(poses[a].inverse() * poses[b])
     }
 
-    /// Time that the slowest joint needs from `a` to `b` at full speed, seconds.
-    pub fn joint_time(&self, a: &[f64], b: &[f64]) -> f64 {
-        let time = |((joint, a), b): ((&Joint, &f64), &f64)| (a - b).abs() / joint.velocity;
-        self.joints.iter().zip(a).zip(b).map(time).fold(0.0, f64::max)
+    /// Time that the slowest joint needs from the joint positions `a` to `b` at full speed,
+    /// seconds.
+    pub fn min_travel_time(&self, a: &[f64], b: &[f64]) -> f64 {
+        self.joints
+            .iter()
+            .zip(a)
+            .zip(b)
+            .map(|((joint, a), b)| (a - b).abs() / joint.velocity)
+            .fold(0.0, f64::max)
     }
 }
-
-/// A position that rounding has put this far beyond a limit is still within, radians or metres.
-const LIMIT_SLACK: f64 = 1e-9;

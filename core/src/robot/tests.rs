@@ -1,9 +1,11 @@
 //! Tests of the robot as a whole.
 
-use super::chain::{Chain, slide_and_roll};
-use super::family::{Extent, family};
+use super::kinematic_chain::{KinematicChain, view_from_sensor};
+use super::view_solutions::{IkSearch, solve_view};
 use super::*;
-use crate::geometry::{Aabb, Pose, SensorModel, Shape, StriperModel, Twist, Vec3, exp, log};
+use crate::geometry::{
+    Aabb, Pose, SensorModel, Shape, StriperModel, Twist, Vec3, exp, log, transform,
+};
 use crate::mesh::{is_closed, is_oriented};
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
@@ -11,7 +13,10 @@ use rand_chacha::ChaCha8Rng;
 
 /// The extent of an object of 0.1 x 0.1 x 0.18 m that stands on z = 0.
 pub(super) fn object() -> Obstacle {
-    Obstacle::of_box(&Aabb { min: Vec3::new(-0.05, -0.05, 0.0), max: Vec3::new(0.05, 0.05, 0.18) })
+    Obstacle::from_box(&Aabb {
+        min: Vec3::new(-0.05, -0.05, 0.0),
+        max: Vec3::new(0.05, 0.05, 0.18),
+    })
 }
 
 /// The view of the object's middle from a direction.
@@ -24,7 +29,7 @@ pub(super) fn view(direction: &Vec3, distance: f64) -> Pose {
 }
 
 fn robot(setup: &str) -> RobotModel {
-    RobotModel::from_urdf(description(setup).unwrap()).unwrap()
+    RobotModel::from_urdf(setup_urdf(setup).unwrap()).unwrap()
 }
 
 pub(super) fn cell(setup: &str) -> Workcell {
@@ -35,10 +40,10 @@ fn random(robot: &RobotModel, rng: &mut ChaCha8Rng) -> Vec<f64> {
     robot.joints().iter().map(|j| rng.random_range(j.limits[0]..=j.limits[1])).collect()
 }
 
-fn request<'a>(view: Pose, start: &'a [f64], obstacle: &'a Obstacle) -> ReachRequest<'a> {
+fn request<'a>(view: Pose, start: &'a [f64], obstacle: &'a Obstacle) -> ReachabilityRequest<'a> {
     let sensor = SensorModel::Striper(StriperModel::SCANCONTROL);
     let slide = slide_range(&sensor, 0.15);
-    ReachRequest { view, start, sweep: sensor.sweep(), slide, obstacle, margin: 0.01 }
+    ReachabilityRequest { view, start, sweep: sensor.sweep_length(), slide, obstacle, margin: 0.01 }
 }
 
 #[test]
@@ -81,7 +86,7 @@ fn the_flange_of_the_lwr_stands_where_its_lengths_put_it() {
 #[test]
 fn the_second_jaw_follows_the_first() {
     let robot = robot("omnirob_stereo");
-    let mut q = home("omnirob_stereo").unwrap();
+    let mut q = home_configuration("omnirob_stereo").unwrap();
     let jaw = robot.joints().iter().position(|j| j.name == "gripper_left_joint").unwrap();
     assert!(robot.joints().iter().all(|j| j.name != "gripper_right_joint"));
     for opening in [0.0, 0.055] {
@@ -95,26 +100,28 @@ fn the_second_jaw_follows_the_first() {
 #[test]
 fn the_jacobian_is_the_derivative_of_the_view() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    for setup in SETUPS {
+    for setup in SETUP_NAMES {
         let robot = robot(setup);
         let ends = [robot.link(OBJECT_FRAME).unwrap(), robot.link(SENSOR_FRAME).unwrap()];
-        let chain = Chain::new(&robot, ends[0], ends[1]);
+        let chain = KinematicChain::new(&robot, ends[0], ends[1]);
         for _ in 0..20 {
             let q = random(&robot, &mut rng);
-            let mut x: Vec<f64> = chain.joints.iter().map(|&j| q[j]).collect();
+            let mut x = chain.joint_positions(&q);
             let expected = robot.pose(&q, OBJECT_FRAME, SENSOR_FRAME).unwrap();
-            assert!(log(&(chain.pose(&x).inverse() * expected)).norm() < 1e-9);
+            assert!(log(&(chain.end_pose(&x).inverse() * expected)).norm() < 1e-9);
             x.extend([0.05, 0.7]);
             let (mut columns, mut unused) = (Vec::new(), Vec::new());
-            let here = chain.view(&x, &mut columns);
-            assert!(log(&((here * slide_and_roll(0.05, 0.7)).inverse() * expected)).norm() < 1e-9);
+            let here = chain.view_with_jacobian(&x, &mut columns);
+            assert!(
+                log(&((here * view_from_sensor(0.05, 0.7)).inverse() * expected)).norm() < 1e-9
+            );
             for i in 0..x.len() {
-                let mut at = |h: f64| {
+                let [ahead, behind] = [1e-5, -1e-5].map(|step| {
                     let mut moved = x.clone();
-                    moved[i] += h;
-                    log(&(here.inverse() * chain.view(&moved, &mut unused)))
-                };
-                let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                    moved[i] += step;
+                    log(&(here.inverse() * chain.view_with_jacobian(&moved, &mut unused)))
+                });
+                let slope = (ahead - behind) / 2e-5;
                 assert!((slope - columns[i]).norm() < 1e-7, "{setup} {i}");
             }
         }
@@ -124,17 +131,17 @@ fn the_jacobian_is_the_derivative_of_the_view() {
 #[test]
 fn views_of_random_joint_positions_are_found_again_within_the_limits() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    for setup in SETUPS {
+    for setup in SETUP_NAMES {
         let cell = cell(setup);
-        let start = home(setup).unwrap();
+        let start = home_configuration(setup).unwrap();
         let (count, mut found) = (60, 0);
         for _ in 0..count {
             let pose = cell.object_from_sensor(&random(cell.robot(), &mut rng)).unwrap();
-            let extent = Extent { seeds: 96, slide: [0.0; 2] };
-            let members = family(cell.robot(), &cell.chain, &cell.seeds, &pose, &start, extent);
+            let search = IkSearch { seed_count: 96, slide: [0.0; 2] };
+            let members = solve_view(cell.robot(), &cell.chain, &cell.seeds, &pose, &start, search);
             found += usize::from(!members.is_empty());
             for member in &members {
-                assert_eq!(cell.robot().beyond_limits(&member.q), None);
+                assert_eq!(cell.robot().joint_beyond_limits(&member.q), None);
                 let actual = cell.object_from_sensor(&member.q).unwrap();
                 assert!(log(&(member.pose.inverse() * actual)).norm() < 1e-6);
                 // Same place and viewing axis; only the roll differs.
@@ -150,29 +157,35 @@ fn views_of_random_joint_positions_are_found_again_within_the_limits() {
 
 #[test]
 fn collisions_are_seen_and_free_positions_are_free() {
-    for setup in SETUPS {
-        let obstructed = |q: &[f64]| cell(setup).obstructed(q, &object(), 0.01).unwrap();
-        assert_eq!(obstructed(&home(setup).unwrap()), None);
+    for setup in SETUP_NAMES {
+        let home = home_configuration(setup).unwrap();
+        assert_eq!(obstruction(&cell(setup), &home), None);
     }
     let cell = cell("kr16_laser");
-    let q = |degrees: [f64; 6]| degrees.map(f64::to_radians);
-    let obstructed = |q: &[f64]| cell.obstructed(q, &object(), 0.01).unwrap();
     // The forearm through the table, and the sensor folded into the arm.
-    let why = obstructed(&q([0.0, -20.0, 60.0, 0.0, 0.0, 0.0])).unwrap();
+    let why = obstruction(&cell, &radians([0.0, -20.0, 60.0, 0.0, 0.0, 0.0])).unwrap();
     assert!(why.contains("table") || why.contains("object"), "{why}");
-    assert!(obstructed(&q([180.0, -90.0, 150.0, 0.0, 0.0, 0.0])).is_some());
-    assert_eq!(obstructed(&q([180.0, -90.0, 0.0, 0.0, 0.0, 0.0])), None);
-    let why = obstructed(&q([0.0, 40.0, 0.0, 0.0, 0.0, 0.0])).unwrap();
+    assert!(obstruction(&cell, &radians([180.0, -90.0, 150.0, 0.0, 0.0, 0.0])).is_some());
+    assert_eq!(obstruction(&cell, &radians([180.0, -90.0, 0.0, 0.0, 0.0, 0.0])), None);
+    let why = obstruction(&cell, &radians([0.0, 40.0, 0.0, 0.0, 0.0, 0.0])).unwrap();
     assert!(why.contains("`joint_a2` is beyond its limits"), "{why}");
-    assert!(cell.obstructed(&[0.0; 5], &object(), 0.01).is_err());
+    assert!(cell.find_obstruction(&[0.0; 5], &object(), 0.01).is_err());
+}
+
+fn obstruction(cell: &Workcell, q: &[f64]) -> Option<String> {
+    cell.find_obstruction(q, &object(), 0.01).unwrap()
+}
+
+fn radians(degrees: [f64; 6]) -> [f64; 6] {
+    degrees.map(f64::to_radians)
 }
 
 #[test]
 fn ways_and_sweeps_are_free_when_checked_densely() {
     let cell = cell("kr16_laser");
     let obstacle = object();
-    let all = cell.collisions.with(cell.robot(), &cell.chain, &obstacle);
-    let mut start = home("kr16_laser").unwrap();
+    let all = cell.collisions.with_obstacle(cell.robot(), &cell.chain, &obstacle);
+    let mut start = home_configuration("kr16_laser").unwrap();
     let mut bent = 0;
     for (azimuth, elevation) in
         [(90.0, 10.0), (-90.0, 15.0), (170.0, 20.0), (10.0, 30.0), (120.0, 5.0)]
@@ -180,26 +193,29 @@ fn ways_and_sweeps_are_free_when_checked_densely() {
         let (a, e) = (f64::to_radians(azimuth), f64::to_radians(elevation));
         let direction = Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin());
         let request = request(view(&direction, 0.3), &start, &obstacle);
-        let reach = cell.reach(&request).unwrap();
-        assert_eq!(reach, cell.reach(&request).unwrap(), "not the same twice");
-        let Reach::Reached(reached) = reach else { panic!("{azimuth} {elevation}: {reach:?}") };
+        let reach = cell.check_reachability(&request).unwrap();
+        assert_eq!(reach, cell.check_reachability(&request).unwrap(), "not the same twice");
+        let Reachability::Reachable(reached) = reach else {
+            panic!("{azimuth} {elevation}: {reach:?}")
+        };
         assert_eq!(reached.path.positions.first(), Some(&start));
         assert_eq!(reached.path.positions.last(), Some(&reached.q));
         let sweep = reached.sweep.unwrap();
         for trajectory in [&reached.path, &sweep] {
             for (pair, times) in trajectory.positions.windows(2).zip(trajectory.times.windows(2)) {
-                let time = cell.robot().joint_time(&pair[0], &pair[1]);
+                let time = cell.robot().min_travel_time(&pair[0], &pair[1]);
                 assert!(time <= (times[1] - times[0]) * (1.0 + 1e-9));
                 for i in 0..=20 {
-                    let q = motion::between(&pair[0], &pair[1], f64::from(i) / 20.0);
-                    let clearance = all.clearance(&cell.robot().forward(&q), 0.01);
+                    let q = planning_space::interpolate(&pair[0], &pair[1], f64::from(i) / 20.0);
+                    let clearance = all.clearance(&cell.robot().forward_kinematics(&q), 0.01);
                     assert!(clearance.distance > 0.003, "{clearance:?}");
-                    assert_eq!(cell.robot().beyond_limits(&q), None);
+                    assert_eq!(cell.robot().joint_beyond_limits(&q), None);
                 }
             }
         }
         check_sweep(&cell, &sweep, &reached.object_from_sensor);
-        let straight = cell.space(&all, 0.01).blocked(&start, &reached.q).is_none();
+        let straight =
+            cell.planning_space(&all, 0.01).collision_between(&start, &reached.q).is_none();
         bent += usize::from(!straight);
         start = reached.q;
     }
@@ -219,30 +235,39 @@ fn check_sweep(cell: &Workcell, sweep: &Trajectory, middle: &Pose) {
 #[test]
 fn refusals_say_why() {
     let cell = cell("kr16_laser");
-    let (home, obstacle) = (home("kr16_laser").unwrap(), object());
-    let refusal = |request: &ReachRequest| match cell.reach(request).unwrap() {
-        Reach::Refused { reason, .. } => reason,
-        Reach::Reached(reached) => panic!("{:?}", reached.q),
-    };
+    let (home, obstacle) = (home_configuration("kr16_laser").unwrap(), object());
     let far = request(view(&Vec3::x(), 3.0), &home, &obstacle);
-    assert!(refusal(&far).starts_with("out of reach"), "{}", refusal(&far));
+    assert!(refusal(&cell, &far).starts_with("out of reach"), "{}", refusal(&cell, &far));
     // From below: the table is in the way.
     let below = request(view(&Vec3::new(-0.2, 0.0, -1.0), 0.3), &home, &obstacle);
-    assert!(refusal(&below).contains("collide"), "{}", refusal(&below));
-    let huge = Obstacle::of_sphere(&Vec3::zeros(), 0.9);
-    let why = refusal(&request(view(&Vec3::x(), 0.3), &home, &huge));
+    assert!(refusal(&cell, &below).contains("collide"), "{}", refusal(&cell, &below));
+    let huge = Obstacle::from_sphere(&Vec3::zeros(), 0.9);
+    let why = refusal(&cell, &request(view(&Vec3::x(), 0.3), &home, &huge));
     assert!(why.contains("stands in a collision"), "{why}");
-    assert!(cell.reach(&request(view(&Vec3::x(), 0.3), &home[1..], &obstacle)).is_err());
+    assert!(
+        cell.check_reachability(&request(view(&Vec3::x(), 0.3), &home[1..], &obstacle)).is_err()
+    );
+}
+
+fn refusal(cell: &Workcell, request: &ReachabilityRequest) -> String {
+    match cell.check_reachability(request).unwrap() {
+        Reachability::Unreachable { reason, .. } => reason,
+        Reachability::Reachable(motion) => panic!("{:?}", motion.q),
+    }
+}
+
+fn link(name: &str) -> String {
+    format!("<link name='{name}'/>")
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str, rest: &str) -> String {
+    format!(
+        "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{rest}</joint>"
+    )
 }
 
 #[test]
 fn wrong_descriptions_are_refused_with_the_name_of_what_is_wrong() {
-    let link = |name: &str| format!("<link name='{name}'/>");
-    let joint = |name: &str, kind: &str, parent: &str, child: &str, rest: &str| {
-        format!(
-            "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{rest}</joint>"
-        )
-    };
     let limit = "<limit lower='-1' upper='1' effort='1' velocity='1'/>";
     let two = link("a") + &link("b");
     let mesh = "<link name='m'><collision><geometry><mesh filename='x.stl'/></geometry></collision></link>";
@@ -286,15 +311,15 @@ fn wrong_descriptions_are_refused_with_the_name_of_what_is_wrong() {
     let error = robot.pose(&[0.0], "a", "elsewhere").unwrap_err().to_string();
     assert!(error.contains("`elsewhere`"), "{error}");
     assert!(Workcell::new(robot).unwrap_err().to_string().contains("`object`"));
-    assert!(description("kr17").unwrap_err().to_string().contains("omnirob_stereo"));
+    assert!(setup_urdf("kr17").unwrap_err().to_string().contains("omnirob_stereo"));
 }
 
 #[test]
 fn the_bodies_as_meshes_are_closed_and_their_points_are_cut() {
     let robot = robot("omnirob_stereo");
-    let q = home("omnirob_stereo").unwrap();
+    let q = home_configuration("omnirob_stereo").unwrap();
     let links = ["gripper", "gripper_left", "gripper_right", "lwr_link_6"];
-    let mesh = robot.shapes_mesh(&links, &q).unwrap();
+    let mesh = robot.link_shapes_mesh(&links, &q).unwrap();
     assert!(is_closed(&mesh) && is_oriented(&mesh));
     let volume = std::f64::consts::PI * 0.045f64.powi(2) * 0.03
         + 0.08 * 0.14 * 0.08
@@ -302,7 +327,7 @@ fn the_bodies_as_meshes_are_closed_and_their_points_are_cut() {
         + 4.0 / 3.0 * std::f64::consts::PI * 0.065f64.powi(3);
     assert!((mesh.volume() / volume - 1.0).abs() < 0.01, "{} {volume}", mesh.volume());
 
-    let poses = robot.forward(&q);
+    let poses = robot.forward_kinematics(&q);
     let object = poses[robot.link(OBJECT_FRAME).unwrap()].inverse();
     let bodies: Vec<(Shape, Pose)> = robot
         .link_shapes()
@@ -311,12 +336,12 @@ fn the_bodies_as_meshes_are_closed_and_their_points_are_cut() {
         .map(|s| (s.shape, object * poses[s.link] * s.link_from_shape))
         .collect();
     let filter = BodyFilter::new(&bodies, 0.005);
-    assert!(filter.on_body(&mesh.vertices).iter().all(|on| *on));
+    assert!(filter.mask_on_bodies(&mesh.vertices).iter().all(|on| *on));
     // The palm ends 70 mm below the jaws' tips; the space between the open jaws is free.
     let nan = Vec3::repeat(f64::NAN);
     let points = [Vec3::zeros(), Vec3::new(0.0, 0.034, 0.015), Vec3::new(0.0, 0.0, 0.03), nan];
-    assert_eq!(filter.on_body(&points), [false, true, false, false]);
-    assert!(robot.shapes_mesh(&["nothing"], &q).is_err());
+    assert_eq!(filter.mask_on_bodies(&points), [false, true, false, false]);
+    assert!(robot.link_shapes_mesh(&["nothing"], &q).is_err());
 }
 
 #[test]
@@ -330,13 +355,13 @@ fn the_filter_cuts_what_lies_within_its_margin_and_nothing_else() {
     ];
     let points: Vec<Vec3> =
         (0..20000).map(|_| Vec3::from_fn(|_, _| rng.random_range(-0.6..1.2))).collect();
-    let cut = BodyFilter::new(&bodies, 0.02).on_body(&points);
-    let near = |p: &Vec3| {
-        let distance = |(shape, pose): &(Shape, Pose)| {
-            shape.distance(&pose.inverse_transform_point(&(*p).into()).coords)
-        };
-        bodies.iter().map(distance).fold(f64::INFINITY, f64::min) <= 0.02
-    };
-    assert!(points.iter().zip(&cut).all(|(p, cut)| near(p) == *cut));
+    let cut = BodyFilter::new(&bodies, 0.02).mask_on_bodies(&points);
+    for (point, cut) in points.iter().zip(&cut) {
+        let distance = bodies
+            .iter()
+            .map(|(shape, pose)| shape.distance(&transform(&pose.inverse(), point)))
+            .fold(f64::INFINITY, f64::min);
+        assert_eq!(distance <= 0.02, *cut, "{point:?} {distance}");
+    }
     assert!(cut.iter().filter(|c| **c).count() > 50);
 }

@@ -1,47 +1,55 @@
-//! From URDF to a checked tree.
+//! Reads a URDF into a checked robot model.
 
-use super::model::{Edge, Joint, JointKind, LinkShape, Motion, RobotModel};
+use super::model::{Edge, Joint, JointKind, JointMotion, LinkShape, RobotModel};
 use crate::geometry::{Pose, Shape, Vec3};
 use crate::{Error, Result};
 use nalgebra::{Translation3, Unit, UnitQuaternion};
 use urdf_rs::{Geometry, JointType};
 
+/// An axis shorter than this has no direction.
+const MIN_AXIS_NORM: f64 = 1e-9;
+
 impl RobotModel {
-    /// Reads a plain URDF: revolute, continuous, prismatic, fixed and mimic joints; boxes, cylinders and spheres
-    /// as collision bodies.
+    /// Reads a plain URDF: revolute, continuous, prismatic, fixed and mimic joints; boxes,
+    /// cylinders and spheres as collision bodies.
     ///
     /// # Errors
-    /// [`Error::Input`] that names the link or joint: text that is no URDF, links missing, named twice or in a
-    /// cycle, more than one root, joints without limits or axis, bodies that are meshes.
+    /// [`Error::Input`] that names the link or joint: text that is no URDF, links missing, named
+    /// twice or in a cycle, more than one root, joints without limits or axis, bodies that are
+    /// meshes.
     pub fn from_urdf(text: &str) -> Result<RobotModel> {
         let robot = urdf_rs::read_from_string(text)
             .map_err(|e| Error::input(format!("the robot description is no valid URDF: {e}")))?;
         let link_names: Vec<String> = robot.links.iter().map(|l| l.name.clone()).collect();
-        unique("link", &link_names)?;
-        unique("joint", &robot.joints.iter().map(|j| j.name.clone()).collect::<Vec<_>>())?;
+        check_unique("link", &link_names)?;
+        check_unique("joint", &robot.joints.iter().map(|j| j.name.clone()).collect::<Vec<_>>())?;
         if link_names.is_empty() {
             return Err(Error::input("the robot description has no link"));
         }
-        let joints: Vec<Joint> =
-            robot.joints.iter().filter_map(|j| free_joint(j).transpose()).collect::<Result<_>>()?;
+        let joints: Vec<Joint> = robot
+            .joints
+            .iter()
+            .filter_map(|j| actuated_joint(j).transpose())
+            .collect::<Result<_>>()?;
         let edges: Vec<Edge> = robot
             .joints
             .iter()
-            .map(|j| edge(j, &robot.joints, &joints, &link_names))
+            .map(|j| build_edge(j, &robot.joints, &joints, &link_names))
             .collect::<Result<_>>()?;
-        let (edges, above) = sorted(edges, &link_names)?;
+        let (edges, parent_edge) = sort_edges(edges, &link_names)?;
         let mut shapes = Vec::new();
         for (link, description) in robot.links.iter().enumerate() {
             for body in &description.collision {
-                let shape = shape(&body.geometry, &description.name)?;
-                shapes.push(LinkShape { link, shape, link_from_shape: pose(&body.origin) });
+                let shape = convert_shape(&body.geometry, &description.name)?;
+                shapes.push(LinkShape { link, shape, link_from_shape: convert_pose(&body.origin) });
             }
         }
-        Ok(RobotModel { name: robot.name, joints, link_names, shapes, edges, above })
+        Ok(RobotModel { name: robot.name, joints, link_names, shapes, edges, parent_edge })
     }
 }
 
-fn unique(kind: &str, names: &[String]) -> Result<()> {
+/// Checks that no name occurs twice.
+fn check_unique(kind: &str, names: &[String]) -> Result<()> {
     match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
         Some((_, name)) => {
             Err(Error::input(format!("the {kind} `{name}` is described twice; rename one")))
@@ -50,8 +58,8 @@ fn unique(kind: &str, names: &[String]) -> Result<()> {
     }
 }
 
-/// The joint as one that can be commanded; none if it is fixed or follows another.
-fn free_joint(joint: &urdf_rs::Joint) -> Result<Option<Joint>> {
+/// The joint as one that can be commanded; `None` if it is fixed or follows another one.
+fn actuated_joint(joint: &urdf_rs::Joint) -> Result<Option<Joint>> {
     let kind = match joint.joint_type {
         JointType::Fixed => return Ok(None),
         _ if joint.mimic.is_some() => return Ok(None),
@@ -81,44 +89,51 @@ fn free_joint(joint: &urdf_rs::Joint) -> Result<Option<Joint>> {
     Ok(Some(Joint { name: joint.name.clone(), kind, limits, velocity: limit.velocity }))
 }
 
-fn edge(
+fn build_edge(
     joint: &urdf_rs::Joint,
     all: &[urdf_rs::Joint],
-    free: &[Joint],
+    actuated: &[Joint],
     links: &[String],
 ) -> Result<Edge> {
-    let place = |name: &str| {
-        links.iter().position(|l| l == name).ok_or_else(|| {
-            Error::input(format!(
-                "the joint `{}` names the link `{name}`, which is not described",
-                joint.name
-            ))
-        })
-    };
-    let (parent, child) = (place(&joint.parent.link)?, place(&joint.child.link)?);
+    let parent = link_of_joint(joint, &joint.parent.link, links)?;
+    let child = link_of_joint(joint, &joint.child.link, links)?;
     let motion = match joint.joint_type {
         JointType::Fixed => None,
-        _ => Some(motion(joint, all, free)?),
+        _ => Some(build_motion(joint, all, actuated)?),
     };
-    Ok(Edge { parent, child, parent_from_joint: pose(&joint.origin), motion })
+    Ok(Edge { parent, child, parent_from_joint: convert_pose(&joint.origin), motion })
 }
 
-fn motion(joint: &urdf_rs::Joint, all: &[urdf_rs::Joint], free: &[Joint]) -> Result<Motion> {
-    let axis = Unit::try_new(Vec3::from(*joint.axis.xyz), 1e-9)
+/// Index of the link `name`, which the joint is attached to.
+fn link_of_joint(joint: &urdf_rs::Joint, name: &str, links: &[String]) -> Result<usize> {
+    links.iter().position(|l| l == name).ok_or_else(|| {
+        Error::input(format!(
+            "the joint `{}` names the link `{name}`, which is not described",
+            joint.name
+        ))
+    })
+}
+
+fn build_motion(
+    joint: &urdf_rs::Joint,
+    all: &[urdf_rs::Joint],
+    actuated: &[Joint],
+) -> Result<JointMotion> {
+    let axis = Unit::try_new(Vec3::from(*joint.axis.xyz), MIN_AXIS_NORM)
         .ok_or_else(|| Error::input(format!("the joint `{}` has a zero axis", joint.name)))?;
-    let (leader, factor, offset) = match &joint.mimic {
+    let (leader, multiplier, offset) = match &joint.mimic {
         None => (joint.name.as_str(), 1.0, 0.0),
         Some(m) => (m.joint.as_str(), m.multiplier.unwrap_or(1.0), m.offset.unwrap_or(0.0)),
     };
     let known = all.iter().any(|j| j.name == leader);
-    let Some(index) = free.iter().position(|j| j.name == leader) else {
+    let Some(index) = actuated.iter().position(|j| j.name == leader) else {
         let why = if known { "is fixed or a mimic itself" } else { "is not described" };
         return Err(Error::input(format!(
             "the joint `{}` mimics `{leader}`, which {why}",
             joint.name
         )));
     };
-    let slides = match joint.joint_type {
+    let is_prismatic = match joint.joint_type {
         JointType::Revolute | JointType::Continuous => false,
         JointType::Prismatic => true,
         ref other => {
@@ -128,11 +143,11 @@ fn motion(joint: &urdf_rs::Joint, all: &[urdf_rs::Joint], free: &[Joint]) -> Res
             )));
         }
     };
-    Ok(Motion { axis, slides, joint: index, factor, offset })
+    Ok(JointMotion { axis, is_prismatic, joint: index, multiplier, offset })
 }
 
-/// The edges with parents before children, and the edge above each link.
-fn sorted(edges: Vec<Edge>, links: &[String]) -> Result<(Vec<Edge>, Vec<Option<usize>>)> {
+/// The edges with parents before children, and the edge to the parent of each link.
+fn sort_edges(edges: Vec<Edge>, links: &[String]) -> Result<(Vec<Edge>, Vec<Option<usize>>)> {
     let mut has_parent = vec![false; links.len()];
     for edge in &edges {
         if std::mem::replace(&mut has_parent[edge.child], true) {
@@ -150,26 +165,26 @@ fn sorted(edges: Vec<Edge>, links: &[String]) -> Result<(Vec<Edge>, Vec<Option<u
         )));
     }
     let mut order = Vec::with_capacity(edges.len());
-    let mut above = vec![None; links.len()];
+    let mut parent_edge = vec![None; links.len()];
     let mut ready = roots;
     while let Some(link) = ready.pop() {
         for edge in edges.iter().filter(|e| e.parent == link) {
-            above[edge.child] = Some(order.len());
+            parent_edge[edge.child] = Some(order.len());
             order.push(edge.clone());
             ready.push(edge.child);
         }
     }
     if order.len() < edges.len() {
-        let lost = edges.iter().find(|e| above[e.child].is_none()).map_or(0, |e| e.child);
+        let lost = edges.iter().find(|e| parent_edge[e.child].is_none()).map_or(0, |e| e.child);
         return Err(Error::input(format!(
             "the link `{}` is part of a cycle of joints; a robot is a tree with one root",
             links[lost]
         )));
     }
-    Ok((order, above))
+    Ok((order, parent_edge))
 }
 
-fn shape(geometry: &Geometry, link: &str) -> Result<Shape> {
+fn convert_shape(geometry: &Geometry, link: &str) -> Result<Shape> {
     let shape = match geometry {
         Geometry::Box { size } => Shape::Box { half: Vec3::from(**size) / 2.0 },
         Geometry::Cylinder { radius, length } => {
@@ -194,7 +209,7 @@ fn shape(geometry: &Geometry, link: &str) -> Result<Shape> {
     }
 }
 
-fn pose(origin: &urdf_rs::Pose) -> Pose {
+fn convert_pose(origin: &urdf_rs::Pose) -> Pose {
     let [roll, pitch, yaw] = *origin.rpy;
     Pose::from_parts(
         Translation3::from(Vec3::from(*origin.xyz)),

@@ -1,36 +1,36 @@
-//! What a session is told, and what it wants done.
+//! Events that a session reacts to, and commands that it gives.
 
 use crate::register::Status;
 
 /// What the session is waiting for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// The start.
+    /// All nodes to be there.
     Preparing,
-    /// The next view.
+    /// The planner's next view.
     Planning,
-    /// The robot.
+    /// The robot to reach the view.
     Moving,
-    /// The sensor.
+    /// The sensor to deliver a scan.
     Scanning,
-    /// The verdict on the scan.
+    /// The registrar's verdict on the scan.
     Registering,
-    /// The joint optimisation.
+    /// The joint optimisation of all poses.
     Refining,
-    /// The cloud.
+    /// The filtered cloud.
     Filtering,
     /// The mesh.
     Reconstructing,
-    /// The operator, who paused it.
+    /// The operator, who paused the session.
     Paused,
-    /// Nothing more.
+    /// Nothing: the session has ended.
     Done,
 }
 
-/// What happened.
+/// What happened, as the caller reports it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// All partners are there.
+    /// All nodes are there.
     Ready,
     /// The planner found a view.
     Planned {
@@ -39,29 +39,29 @@ pub enum Event {
         /// What the view is expected to gain.
         gain: f64,
     },
-    /// The planner has no view left; why.
-    NothingLeft {
-        /// As for [`Event::Planned`].
+    /// The planner has no view left.
+    NoViewLeft {
+        /// Share of the known surface that holds its measurements, 0 to 1.
         coverage: f64,
         /// Why there is none.
         reason: String,
     },
-    /// The robot stands at the view.
+    /// The robot is at the view.
     Moved,
-    /// The sensor delivered.
+    /// The sensor delivered a scan.
     Scanned,
     /// The registrar's verdict on the scan.
     Registered(Status),
-    /// The current command succeeded (refine, filter).
+    /// The current command, [`Command::Refine`] or [`Command::Filter`], succeeded.
     Finished,
-    /// The mesh is made.
+    /// The mesh is reconstructed.
     Reconstructed {
         /// Mean standard deviation of its vertices, metres.
         sigma: f64,
     },
-    /// The current command failed; why.
+    /// The current command failed, for the reason given.
     Failed(String),
-    /// The operator wants to hold before the next motion.
+    /// The operator wants to pause before the next motion.
     Pause,
     /// The operator wants to go on.
     Resume,
@@ -76,8 +76,8 @@ pub enum Command {
     Plan {
         /// Number of scans.
         scans: usize,
-        /// How many times the points that are configured a surface voxel needs.
-        factor: usize,
+        /// Points that a surface voxel needs, as a multiple of the configured number.
+        point_factor: usize,
     },
     /// Move to the planned view.
     Move,
@@ -93,26 +93,26 @@ pub enum Command {
         /// Number of scans.
         scans: usize,
     },
-    /// Combine all `scans` scans.
+    /// Filter all `scans` scans.
     Filter {
         /// Number of scans.
         scans: usize,
     },
-    /// Make the mesh.
+    /// Reconstruct the mesh.
     Reconstruct,
     /// Wait until the operator resumes.
-    Hold,
-    /// The end.
-    End(Outcome),
+    WaitForResume,
+    /// End the session.
+    End(SessionOutcome),
 }
 
 /// How a session ended.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
-    /// With a mesh; why no more scans were taken.
+pub enum SessionOutcome {
+    /// With a mesh; the text says why no more scans were taken.
     Modelled(String),
-    /// Without a mesh, in the given phase; why.
+    /// Without a mesh; the phase in which it failed, and the reason.
     Failed(Phase, String),
-    /// The operator ended it.
+    /// The operator cancelled it.
     Cancelled,
 }

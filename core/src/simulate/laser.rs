@@ -1,49 +1,59 @@
-//! Laser striper, swept by the arm: scanCONTROL 2700-100 on a KR 16-2.
+//! Laser striper swept by the arm: scanCONTROL 2700-100 on a KR 16-2.
 //!
-//! The laser's fan lies in the xz plane of the sensor frame, and the arm carries it along y. The camera stands
-//! beside the laser along y, so that what it cannot see is a triangulation shadow.
+//! The laser's fan lies in the xz plane of the sensor frame, and the arm carries it along y. The
+//! camera is beside the laser along y, so that what it cannot see is a triangulation shadow.
 
-use super::labels::{FLYING, GOOD, OUTLIER};
-use super::noise::{Dice, Edge, Use, edge, flying_depth, normal};
-use super::scene::{Hit, Scene};
-use super::{SimulateParams, f32s};
-use crate::geometry::{Pose, Scan, StriperModel, Vec3};
+use super::depth_edge::{DepthEdge, draw_flying_depth, find_depth_edge};
+use super::labels::{FLYING_LABEL, OUTLIER_LABEL};
+use super::params::SimulateParams;
+use super::random::{RandomSource, RandomUse, standard_normal};
+use super::scene::{Hit, SimulatedScene};
+use super::sensor_output::{MeasuredPoint, NO_POINT, SensorOutput, single_precision};
+use crate::geometry::{Pose, StriperModel, Vec3};
 use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Points of a profile.
-const POINTS: usize = StriperModel::SCANCONTROL.points;
-/// Standard deviation along the ray, metres, head on and at its largest; between them it grows with the
-/// length of the spot on the surface, 1 / cos of the incidence.
-const SIGMA: [f64; 2] = [0.05e-3, 0.2e-3];
-/// Share of outliers.
-pub(super) const OUTLIERS: f64 = 0.0005;
-/// Standard deviation per axis of the arm's wander from one profile to the next, metres.
-pub(super) const JITTER: f64 = 0.007e-3;
-/// Depth difference between neighbours that makes an edge, metres; a slope of 80 degrees stays below.
-const EDGE: f64 = 3e-3;
-/// Share of edge points where the spot is split between both sides.
-const FLYING_SHARE: f64 = 0.3;
-/// How far a flying point lies behind the edge if there is nothing behind, metres: some widths of the spot.
-const TAIL: f64 = 2e-3;
-/// Empty run before and behind the object, metres.
-const RUN: f64 = 5e-3;
+/// Number of points of a profile.
+const PROFILE_POINTS: usize = StriperModel::SCANCONTROL.points;
+/// Standard deviation along the ray at normal incidence, metres. It grows with the length of the
+/// spot on the surface, 1 / cos of the incidence.
+const NORMAL_INCIDENCE_SIGMA: f64 = 0.05e-3;
+/// Largest standard deviation along the ray, metres.
+const MAX_SIGMA: f64 = 0.2e-3;
+/// Share of outliers among the points.
+pub(super) const OUTLIER_RATIO: f64 = 0.0005;
+/// Standard deviation per axis of the arm's random walk from one profile to the next, metres.
+pub(super) const WALK_STEP_SIGMA: f64 = 0.007e-3;
+/// Least difference in depth between neighbours that makes an edge, metres. A slope of 80 degrees
+/// stays below.
+const MIN_EDGE_STEP: f64 = 3e-3;
+/// Share of flying points, where the spot is split between both sides, among the points at an edge.
+const FLYING_RATIO: f64 = 0.3;
+/// How far a flying point lies behind the edge at most if there is nothing behind, metres: some
+/// widths of the spot.
+const MAX_FLYING_TAIL: f64 = 2e-3;
+/// Length of the sweep before and behind the object, metres.
+const SWEEP_OVERRUN: f64 = 5e-3;
+/// Least distance from the laser to the centre of the object, in radii of the object.
+const MIN_DISTANCE_RADII: f64 = 1.5;
 
-/// The striper before an object.
+/// The striper in front of an object.
 pub(crate) struct Striper {
     model: StriperModel,
-    /// Half the diagonal of the object's box, metres: outliers lie within.
+    /// Half the diagonal of the object's box, metres. Outliers lie within this distance of the
+    /// working distance.
     radius: f64,
 }
 
-/// Chooses the number of profiles; an object wider than the fan is scanned from farther off, with all spacings
-/// grown alike.
-pub(crate) fn model_for(scene: &Scene, params: &SimulateParams) -> StriperModel {
-    let sweep = 2.0 * (scene.radius() + RUN);
-    let scale = (sweep / (POINTS as f64 * params.point_spacing)).max(1.0);
+/// The model of a striper that fits the object. An object wider than the fan is scanned from
+/// farther away, with all spacings enlarged by the same factor.
+pub(crate) fn fit_model(scene: &SimulatedScene, params: &SimulateParams) -> StriperModel {
+    let sweep = 2.0 * (scene.radius() + SWEEP_OVERRUN);
+    let scale = (sweep / (PROFILE_POINTS as f64 * params.point_spacing)).max(1.0);
     let profile_spacing = params.profile_spacing * scale;
     StriperModel {
-        working_distance: (params.laser_distance * scale).max(scene.radius() * 1.5),
+        working_distance: (params.laser_distance * scale).max(scene.radius() * MIN_DISTANCE_RADII),
         point_spacing: params.point_spacing * scale,
         profile_spacing,
         profiles: (sweep / profile_spacing).ceil() as usize + 1,
@@ -53,88 +63,103 @@ pub(crate) fn model_for(scene: &Scene, params: &SimulateParams) -> StriperModel 
 }
 
 impl Striper {
-    pub(crate) fn new(model: StriperModel, scene: &Scene) -> Striper {
+    pub(crate) fn new(model: StriperModel, scene: &SimulatedScene) -> Striper {
         Striper { model, radius: scene.radius() }
     }
 
-    /// The origin of each profile as the arm reports it, sensor frame.
+    /// The origin of a profile as the arm reports it, sensor frame, metres.
     fn origin(&self, row: usize) -> Vec3 {
         self.model.origin(row as f64)
     }
 
-    /// Unit direction of the ray of a column.
+    /// Unit direction of the ray of a column, sensor frame.
     fn ray(&self, column: usize) -> Vec3 {
         self.model.ray(column as f64)
     }
 
-    /// How far the arm is off at each profile: a random walk, zero at the middle, where the pose was taken.
-    fn wander(&self, dice: Dice) -> Vec<Vec3> {
-        let mut rng = dice.rng(Use::Sweep, 0);
-        let mut at = Vec3::zeros();
+    /// The error of the arm's position at each profile, metres: a random walk that is zero in the
+    /// middle, where the pose was taken.
+    fn draw_random_walk(&self, source: RandomSource) -> Vec<Vec3> {
+        let mut rng = source.rng(RandomUse::Sweep, 0);
+        let mut offset = Vec3::zeros();
         let walk: Vec<Vec3> = (0..self.model.profiles)
             .map(|_| {
-                at += Vec3::from_fn(|_, _| normal(&mut rng)) * JITTER;
-                at
+                offset += Vec3::from_fn(|_, _| standard_normal(&mut rng)) * WALK_STEP_SIGMA;
+                offset
             })
             .collect();
         let middle = walk[self.model.profiles / 2];
         walk.into_iter().map(|offset| offset - middle).collect()
     }
 
-    /// One sweep from `object_from_sensor`: the scan, labels and noise-free hits.
+    /// One sweep from `object_from_sensor`.
     pub(crate) fn scan(
         &self,
-        scene: &Scene,
+        scene: &SimulatedScene,
         object_from_sensor: &Pose,
-        dice: Dice,
-    ) -> (Scan, Vec<u8>, Vec<[f32; 3]>) {
-        let wander = self.wander(dice);
-        let cast = |index: usize| {
-            let laser = self.origin(index / POINTS) + wander[index / POINTS];
-            let camera = laser - Vec3::y() * self.model.camera_offset;
-            scene.hit(object_from_sensor, &laser, &self.ray(index % POINTS), &camera)
-        };
-        let count = self.model.profiles * POINTS;
-        let hits: Vec<Option<Hit>> = (0..count).into_par_iter().map(cast).collect();
-        let rows: Vec<Vec<([f32; 3], u8)>> = (0..self.model.profiles)
+        source: RandomSource,
+    ) -> SensorOutput {
+        let walk = self.draw_random_walk(source);
+        let count = self.model.profiles * PROFILE_POINTS;
+        let hits: Vec<Option<Hit>> = (0..count)
             .into_par_iter()
-            .map(|row| self.profile(&hits, row, dice))
+            .map(|index| {
+                let laser = self.origin(index / PROFILE_POINTS) + walk[index / PROFILE_POINTS];
+                let camera = laser - Vec3::y() * self.model.camera_offset;
+                let ray = self.ray(index % PROFILE_POINTS);
+                scene.cast_ray(object_from_sensor, &laser, &ray, &camera)
+            })
             .collect();
-        let (points, labels) = rows.concat().into_iter().unzip();
-        let origins = (0..count).map(|i| f32s(&self.origin(i / POINTS))).collect();
-        let hits = hits.iter().map(|hit| hit.map_or([f32::NAN; 3], |h| f32s(&h.point))).collect();
-        (Scan { points, width: POINTS, origins }, labels, hits)
+        let rows: Vec<Vec<MeasuredPoint>> = (0..self.model.profiles)
+            .into_par_iter()
+            .map(|row| self.measure_profile(&hits, row, source))
+            .collect();
+        let origins =
+            (0..count).map(|i| single_precision(&self.origin(i / PROFILE_POINTS))).collect();
+        let hits = hits
+            .iter()
+            .map(|hit| hit.map_or(NO_POINT, |hit| single_precision(&hit.point)))
+            .collect();
+        SensorOutput::new(&rows, PROFILE_POINTS, origins, hits)
     }
 
-    /// What the sensor makes of one row of hits.
-    fn profile(&self, hits: &[Option<Hit>], row: usize, dice: Dice) -> Vec<([f32; 3], u8)> {
-        let mut rng = dice.rng(Use::Sensor, row);
-        let mut measure = |column: usize| {
-            let index = row * POINTS + column;
-            let none = ([f32::NAN; 3], GOOD);
-            let Some(hit) = &hits[index] else { return none };
-            let edge = edge(hits, POINTS, index, EDGE);
-            let (mut depth, mut label) = (hit.depth, hit.label());
-            if rng.random_bool(OUTLIERS) {
-                depth = self.model.working_distance + rng.random_range(-1.0..1.0) * self.radius;
-                label = OUTLIER;
-            } else if edge != Edge::None && rng.random_bool(FLYING_SHARE) {
-                depth = flying_depth(depth, edge, TAIL, &mut rng);
-                label = FLYING;
-            }
-            depth += normal(&mut rng) * sigma(hit.cosine);
-            if !(self.model.range[0]..=self.model.range[1]).contains(&depth) {
-                return none;
-            }
-            (f32s(&(self.origin(row) + self.ray(column) * depth)), label)
-        };
-        (0..POINTS).map(&mut measure).collect()
+    /// What the sensor measures of one row of hits.
+    fn measure_profile(
+        &self,
+        hits: &[Option<Hit>],
+        row: usize,
+        source: RandomSource,
+    ) -> Vec<MeasuredPoint> {
+        let mut rng = source.rng(RandomUse::Sensor, row);
+        (0..PROFILE_POINTS)
+            .map(|column| self.measure(hits, row * PROFILE_POINTS + column, &mut rng))
+            .collect()
+    }
+
+    fn measure(&self, hits: &[Option<Hit>], index: usize, rng: &mut ChaCha8Rng) -> MeasuredPoint {
+        let Some(hit) = &hits[index] else { return MeasuredPoint::NO_RETURN };
+        let edge = find_depth_edge(hits, PROFILE_POINTS, index, MIN_EDGE_STEP);
+        let (mut depth, mut label) = (hit.depth, hit.label());
+        if rng.random_bool(OUTLIER_RATIO) {
+            depth = self.model.working_distance + rng.random_range(-1.0..1.0) * self.radius;
+            label = OUTLIER_LABEL;
+        } else if edge != DepthEdge::None && rng.random_bool(FLYING_RATIO) {
+            depth = draw_flying_depth(depth, edge, MAX_FLYING_TAIL, rng);
+            label = FLYING_LABEL;
+        }
+        depth += standard_normal(rng) * range_sigma(hit.cosine);
+        if !(self.model.range[0]..=self.model.range[1]).contains(&depth) {
+            return MeasuredPoint::NO_RETURN;
+        }
+        let (row, column) = (index / PROFILE_POINTS, index % PROFILE_POINTS);
+        let point = single_precision(&(self.origin(row) + self.ray(column) * depth));
+        MeasuredPoint { point, label }
     }
 }
 
-/// Standard deviation along the ray, metres.
-pub(super) fn sigma(cosine: f64) -> f64 {
-    (SIGMA[0] / cosine).min(SIGMA[1])
+/// Standard deviation along the ray, metres, for the cosine of the angle of incidence.
+pub(super) fn range_sigma(cosine: f64) -> f64 {
+    (NORMAL_INCIDENCE_SIGMA / cosine).min(MAX_SIGMA)
 }
 
 #[cfg(test)]

@@ -1,17 +1,15 @@
 use super::*;
-use crate::geometry::Aabb;
+use crate::Progress;
+use crate::geometry::{Aabb, Pose, SensorModel, Vec3, transform};
+use crate::mesh::Mesh;
 use nalgebra::{Translation3, UnitQuaternion};
 
-/// A block under the plane z = `top`, as twelve triangles.
+/// A block from the plane z = `bottom` to z = `top`.
 fn block(half_x: f64, half_y: f64, bottom: f64, top: f64) -> Mesh {
-    let corner = |i: usize| {
-        let pick = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 1 { high } else { low };
-        Vec3::new(pick(0, -half_x, half_x), pick(1, -half_y, half_y), pick(2, bottom, top))
-    };
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let halves = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
-    Mesh::new((0..8).map(corner).collect(), quads.into_iter().flat_map(halves).collect())
+    crate::mesh::test_shapes::cuboid(
+        Vec3::new(-half_x, -half_y, bottom),
+        Vec3::new(half_x, half_y, top),
+    )
 }
 
 /// A block whose upper face lies in the plane z = 0.
@@ -19,7 +17,8 @@ pub(super) fn slab(half_x: f64, half_y: f64, thickness: f64) -> Mesh {
     block(half_x, half_y, -thickness, 0.0)
 }
 
-/// A slab of 120 x 120 mm with its top at z = 0 and one of 40 x 40 mm with its underside 40 mm above.
+/// A slab of 120 x 120 mm with its top at z = 0 and one of 40 x 40 mm with its underside 40 mm
+/// above.
 pub(super) fn two_slabs() -> Mesh {
     let (mut lower, upper) = (slab(0.06, 0.06, 0.01), block(0.02, 0.02, 0.04, 0.045));
     lower.vertices.extend(upper.vertices);
@@ -27,15 +26,20 @@ pub(super) fn two_slabs() -> Mesh {
     lower
 }
 
-/// Whether the upper of [`two_slabs`] hides `point`, seen from `eye`, in the frame of a sensor 0.3 m above the
-/// lower one; `None` within 2 mm of the border of its shadow.
+/// Whether the upper of [`two_slabs`] hides `point`, seen from `eye`, in the frame of a sensor 0.3
+/// m above the lower one; `None` within 2 mm of the border of its shadow.
 pub(super) fn blocked(eye: &Vec3, point: &Vec3) -> Option<bool> {
-    let inside = |depth: f64, margin: f64| {
-        let at = eye + (point - eye) * ((depth - eye.z) / (point.z - eye.z));
-        at.x.abs() < 0.02 + margin && at.y.abs() < 0.02 + margin
-    };
-    let hidden = |margin: f64| inside(0.26, margin) || inside(0.255, margin);
-    (hidden(-0.002) == hidden(0.002)).then(|| hidden(0.0))
+    let [inner, border, outer] = [-0.002, 0.0, 0.002].map(|margin| {
+        meets_upper_slab(eye, point, 0.26, margin) || meets_upper_slab(eye, point, 0.255, margin)
+    });
+    (inner == outer).then_some(border)
+}
+
+/// Whether the line from `eye` to `point` meets the upper of [`two_slabs`], grown by `margin`, at
+/// the depth of its underside or top.
+fn meets_upper_slab(eye: &Vec3, point: &Vec3, depth: f64, margin: f64) -> bool {
+    let at = eye + (point - eye) * ((depth - eye.z) / (point.z - eye.z));
+    at.x.abs() < 0.02 + margin && at.y.abs() < 0.02 + margin
 }
 
 /// A sensor looking at the origin from `distance`, `degrees` off the z axis.
@@ -53,7 +57,7 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    pub(super) fn of(values: &[f64]) -> Figures {
+    pub(super) fn new(values: &[f64]) -> Figures {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let deviation = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
@@ -81,14 +85,13 @@ fn bits(scans: &SimulatedScans) -> Vec<u64> {
 fn a_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let mesh = two_slabs();
     for family in [NoiseFamily::P2K, NoiseFamily::P3] {
-        let run = |threads, seed| {
+        let [one, two, other_seed] = [(1, 7), (2, 7), (2, 8)].map(|(threads, seed)| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let silent = Progress::silent();
             bits(&pool.install(|| simulate(&mesh, &params(family, 2), seed, &silent)).unwrap())
-        };
-        let one = run(1, 7);
-        assert!(one == run(2, 7), "{family:?} depends on the threads");
-        assert!(one != run(2, 8), "{family:?} does not depend on the seed");
+        });
+        assert!(one == two, "{family:?} depends on the threads");
+        assert!(one != other_seed, "{family:?} does not depend on the seed");
     }
 }
 
@@ -103,21 +106,22 @@ fn views_of_the_same_pose_differ() {
 
 #[test]
 fn noise_free_hits_lie_on_the_object_and_cover_it() {
-    let mesh = objects::make("phantom").unwrap();
+    let mesh = objects::make_object("phantom").unwrap();
     let surface = crate::geometry::Surface::new(&mesh.vertices, &mesh.triangles).unwrap();
     for (family, far) in [(NoiseFamily::P1, 0.4e-3), (NoiseFamily::P3, 8e-3)] {
         let scans = simulate(&mesh, &params(family, 12), 3, &Progress::silent()).unwrap();
         let (mut seen, mut errors, mut returns) = (Aabb::EMPTY, Vec::new(), 0);
         for view in &scans.views {
-            let place = |p: Vec3| view.true_pose.transform_point(&p.into()).coords;
             assert_eq!(view.scan.points.len(), view.labels.len());
             for i in view.scan.returns().step_by(37) {
-                let hit = place(Vec3::from(view.hits[i].map(f64::from)));
+                let hit = Vec3::from(view.hits[i].map(f64::from));
+                let hit = transform(&view.true_pose, &hit);
                 assert!(surface.distance(&hit) < 1e-6);
                 seen.insert(&hit);
                 returns += 1;
-                if view.labels[i] == GOOD {
-                    errors.push(surface.distance(&place(view.scan.point(i).unwrap())));
+                if view.labels[i] == GOOD_LABEL {
+                    let point = transform(&view.true_pose, &view.scan.point(i).unwrap());
+                    errors.push(surface.distance(&point));
                 }
             }
         }
@@ -142,9 +146,9 @@ fn a_large_object_is_scanned_whole_from_farther_off() {
 
 #[test]
 fn set_ups_name_their_family() {
-    assert_eq!(NoiseFamily::of_setup("kr16_laser").unwrap(), NoiseFamily::P2K);
-    assert_eq!(NoiseFamily::of_setup("omnirob_stereo").unwrap().sensor(), "stereo");
-    assert!(NoiseFamily::of_setup("x").unwrap_err().to_string().contains("omnirob_stereo"));
+    assert_eq!(NoiseFamily::from_setup("kr16_laser").unwrap(), NoiseFamily::P2K);
+    assert_eq!(NoiseFamily::from_setup("omnirob_stereo").unwrap().sensor_name(), "stereo");
+    assert!(NoiseFamily::from_setup("x").unwrap_err().to_string().contains("omnirob_stereo"));
 }
 
 #[test]
@@ -156,7 +160,7 @@ fn surface_error_of_the_raw_points() {
         ("filter", NoiseFamily::P3),
         ("coffee", NoiseFamily::P3),
     ] {
-        let mesh = objects::make(object).unwrap();
+        let mesh = objects::make_object(object).unwrap();
         let surface = crate::geometry::Surface::new(&mesh.vertices, &mesh.triangles).unwrap();
         let start = std::time::Instant::now();
         let scans = simulate(&mesh, &params(family, 26), 1, &Progress::silent()).unwrap();
@@ -197,15 +201,15 @@ fn what_stands_round_the_object_is_seen_labelled_and_hides_it() {
     let view = simulator.scan_at(0, &reported);
     assert_eq!(view.reported_pose, reported);
     assert_ne!(view.true_pose, reported);
-    let count = |label: u8| view.scan.returns().filter(|&i| view.labels[i] == label).count();
-    assert!(count(GOOD) > 5_000 && count(SURROUNDINGS) > 20_000);
-    for i in view.scan.returns().filter(|&i| view.labels[i] == SURROUNDINGS) {
+    let [good, surroundings] = [GOOD_LABEL, SURROUNDINGS_LABEL]
+        .map(|label| view.scan.returns().filter(|&i| view.labels[i] == label).count());
+    assert!(good > 5_000 && surroundings > 20_000);
+    for i in view.scan.returns().filter(|&i| view.labels[i] == SURROUNDINGS_LABEL) {
         let hit = nalgebra::Point3::from(view.hits[i].map(f64::from));
         assert!((view.true_pose * hit).z < -0.0499);
     }
-    let bits =
-        |v: &SimulatedView| v.scan.points.as_flattened().iter().map(|c| c.to_bits()).collect();
-    let (again, first): (Vec<u32>, Vec<u32>) =
-        (bits(&simulator.scan_at(0, &reported)), bits(&view));
+    let [first, again] = [view, simulator.scan_at(0, &reported)].map(|view| -> Vec<u32> {
+        view.scan.points.as_flattened().iter().map(|c| c.to_bits()).collect()
+    });
     assert!(again == first);
 }

@@ -1,23 +1,31 @@
-//! The verdict on the whole: whether a mesh stands for what was measured.
+//! The verdict on a finished mesh: whether it represents what was measured.
 //!
 //! A mesh can be closed, and near the truth wherever it is, while it leaves most of the object out.
-//! Two shares tell, without any truth: that of the scans that were accepted, and that of the
-//! measured surface that the mesh lies on. Below one half of either, what was measured speaks
-//! against the mesh rather than for it.
+//! Two shares reveal that without ground truth: the share of the scans that were accepted, and the
+//! share of the measured surface that the mesh lies on. Below one half of either, the measurements
+//! contradict the mesh more than they support it.
+//!
+//! ```
+//! use puffer_core::verdict::{ModelVerdict, ScanCount};
+//!
+//! let verdict = ModelVerdict { scans: ScanCount::new(10, 4), cells_explained: Some(0.97) };
+//! let reason = verdict.distrust_reason().unwrap_or_default();
+//! assert!(reason.contains("only 4 of 10 scans"));
+//! ```
 
-mod explained;
+mod explained_cells;
 #[cfg(test)]
 mod tests;
 
-pub use explained::share_of_cells_explained;
+pub use explained_cells::explained_share;
 
 use crate::geometry::Cloud;
 use crate::mesh::Mesh;
-use crate::register::{self, Status};
+use crate::register;
 use serde_json::{Map, Value, json};
 
-/// Least share of the scans and of the cells with which a mesh is trusted: below it, more of what
-/// was measured speaks against the mesh than for it, whatever sensor and object are.
+/// Least share of the scans and of the cells with which a mesh is trusted: below it, more of the
+/// measurements contradict the mesh than support it, for any sensor and object.
 pub const MIN_TRUSTED_SHARE: f64 = 0.5;
 
 /// How many scans came, and how many of them were accepted.
@@ -35,9 +43,9 @@ impl ScanCount {
         (all > 0).then_some(ScanCount { all, accepted })
     }
 
-    /// Counts the verdicts on scans, one for each scan that came.
+    /// Counts the verdicts on scans, one for each scan that came; `None` if none came.
     pub fn from_verdicts(verdicts: &[register::Verdict]) -> Option<ScanCount> {
-        let accepted = verdicts.iter().filter(|v| v.status == Status::Accepted).count();
+        let accepted = verdicts.iter().filter(|v| v.is_accepted()).count();
         ScanCount::new(verdicts.len(), accepted)
     }
 
@@ -57,12 +65,12 @@ impl ScanCount {
     }
 }
 
-/// What is known of how well a mesh and the measurements go together.
+/// How well a mesh and the measurements agree, as far as it is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ModelVerdict {
     /// The scans; `None` where there are none to count, as for a single cloud.
     pub scans: Option<ScanCount>,
-    /// Share of the cloud's cells that the mesh explains, 0 to 1 ([`share_of_cells_explained`]);
+    /// Share of the cloud's cells that the mesh explains, 0 to 1 ([`explained_share`]);
     /// `None` without a mesh.
     pub cells_explained: Option<f64>,
 }
@@ -70,11 +78,11 @@ pub struct ModelVerdict {
 impl ModelVerdict {
     /// The verdict on `mesh`, which was made of `cloud`, which was made of `scans`.
     pub fn new(scans: Option<ScanCount>, cloud: &Cloud, mesh: &Mesh) -> ModelVerdict {
-        ModelVerdict { scans, cells_explained: share_of_cells_explained(cloud, mesh) }
+        ModelVerdict { scans, cells_explained: explained_share(cloud, mesh) }
     }
 
     /// Why the mesh is not to be trusted, in one sentence that says what to do; `None` if it is.
-    pub fn distrust(&self) -> Option<String> {
+    pub fn distrust_reason(&self) -> Option<String> {
         let mut reasons = Vec::new();
         if let Some(scans) = self.scans.filter(|scans| scans.share() < MIN_TRUSTED_SHARE) {
             reasons.push(format!(
@@ -98,22 +106,21 @@ impl ModelVerdict {
             .then(|| format!("the model is not trustworthy: {}", reasons.join("; and ")))
     }
 
-    /// The shares, in words.
+    /// The verdict and its shares in words, for logs.
     pub fn summary(&self) -> String {
-        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         let scans = self.scans.map(|scans| {
             format!(
-                "{} of {} scans accepted ({})",
+                "{} of {} scans accepted ({:.1} %)",
                 scans.accepted,
                 scans.all,
-                percent(scans.share())
+                100.0 * scans.share()
             )
         });
         let cells = self
             .cells_explained
-            .map(|share| format!("{} of the measured surface explained", percent(share)));
+            .map(|share| format!("{:.1} % of the measured surface explained", 100.0 * share));
         let parts: Vec<String> = scans.into_iter().chain(cells).collect();
-        let word = if self.distrust().is_none() { "trustworthy" } else { "NOT trustworthy" };
+        let word = if self.distrust_reason().is_none() { "trustworthy" } else { "NOT trustworthy" };
         if parts.is_empty() {
             "nothing to judge".into()
         } else {
@@ -121,10 +128,10 @@ impl ModelVerdict {
         }
     }
 
-    /// The verdict as reports and JSON have it; null is what is not known.
-    pub fn facts(&self) -> Map<String, Value> {
-        let distrust = self.distrust();
-        let facts = [
+    /// The verdict as reports and JSON hold it; null is what is not known.
+    pub fn to_json(&self) -> Map<String, Value> {
+        let distrust = self.distrust_reason();
+        let fields = [
             ("scans", json!(self.scans.map(|scans| scans.all))),
             ("accepted", json!(self.scans.map(|scans| scans.accepted))),
             ("share_of_scans_accepted", json!(self.scans.map(|scans| scans.share()))),
@@ -132,17 +139,20 @@ impl ModelVerdict {
             ("trustworthy", json!(distrust.is_none())),
             ("not_trustworthy_because", json!(distrust)),
         ];
-        facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+        fields.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
     }
 
-    /// The verdict that a report with [`ModelVerdict::facts`] tells.
-    pub fn from_facts(facts: &Map<String, Value>) -> ModelVerdict {
-        let count = |key: &str| facts.get(key)?.as_u64();
-        let scans = count("scans").zip(count("accepted"));
+    /// Reads the verdict from a report that contains the fields of [`ModelVerdict::to_json`].
+    pub fn from_json(report: &Map<String, Value>) -> ModelVerdict {
+        let scans = count(report, "scans").zip(count(report, "accepted"));
         ModelVerdict {
-            scans: scans
-                .and_then(|(all, accepted)| ScanCount::new(all as usize, accepted as usize)),
-            cells_explained: facts.get("share_of_cells_explained").and_then(Value::as_f64),
+            scans: scans.and_then(|(all, accepted)| ScanCount::new(all, accepted)),
+            cells_explained: report.get("share_of_cells_explained").and_then(Value::as_f64),
         }
     }
+}
+
+/// The count in the field `key`; `None` if there is none.
+fn count(report: &Map<String, Value>, key: &str) -> Option<usize> {
+    report.get(key)?.as_u64().map(|count| count as usize)
 }

@@ -23,8 +23,9 @@ fn ball(count: usize) -> Cloud {
 
 /// The triangles of `mesh` whose corners all satisfy `keep`.
 fn part(mesh: &Mesh, keep: impl Fn(&Vec3) -> bool) -> Mesh {
-    let all = |t: &&[u32; 3]| t.iter().all(|v| keep(&mesh.vertices[*v as usize]));
-    Mesh::new(mesh.vertices.clone(), mesh.triangles.iter().filter(all).copied().collect())
+    let triangles = mesh.triangles.iter().copied();
+    let kept = triangles.filter(|t| t.iter().all(|v| keep(&mesh.vertices[*v as usize])));
+    Mesh::new(mesh.vertices.clone(), kept.collect())
 }
 
 /// The upright rectangle between two corners, in the plane y = 0.
@@ -36,15 +37,19 @@ fn rectangle([x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> Mesh {
 
 /// Points of a square lattice on that rectangle.
 fn lattice([x0, z0]: [f64; 2], [x1, z1]: [f64; 2], spacing: f64) -> Vec<Vec3> {
-    let steps = |length: f64| (length / spacing).round() as usize;
-    let place = |i: usize| (i as f64 + 0.5) * spacing;
-    let row =
-        |i: usize| (0..steps(z1 - z0)).map(move |j| Vec3::new(x0 + place(i), 0.0, z0 + place(j)));
-    (0..steps(x1 - x0)).flat_map(row).collect()
+    let [columns, rows] = [x1 - x0, z1 - z0].map(|length| (length / spacing).round() as usize);
+    let mut points = Vec::new();
+    for i in 0..columns {
+        for j in 0..rows {
+            let [x, z] = [i, j].map(|k| (k as f64 + 0.5) * spacing);
+            points.push(Vec3::new(x0 + x, 0.0, z0 + z));
+        }
+    }
+    points
 }
 
 fn share(cloud: &Cloud, mesh: &Mesh) -> f64 {
-    share_of_cells_explained(cloud, mesh).unwrap()
+    explained_share(cloud, mesh).unwrap()
 }
 
 #[test]
@@ -58,38 +63,48 @@ fn a_whole_ball_is_explained_whatever_was_not_measured() {
     }
     assert_eq!(share(&cloud, &mesh), 1.0);
     let support_alone = cloud.select(&(4000..cloud.len()).collect::<Vec<_>>());
-    assert_eq!(share_of_cells_explained(&support_alone, &mesh), None);
+    assert_eq!(explained_share(&support_alone, &mesh), None);
     assert_eq!(share(&ball(4000), &Mesh::default()), 0.0);
+}
+
+/// Distance between the points on the wall of a cup of 40 mm radius, metres.
+const WALL_SPACING: f64 = 0.0015;
+/// Points in a row round the wall.
+const WALL_COLUMNS: usize = 168;
+
+fn wall_point(column: usize, z: f64) -> Vec3 {
+    let (sin, cos) = (TAU * column as f64 / WALL_COLUMNS as f64).sin_cos();
+    Vec3::new(0.04 * cos, 0.04 * sin, z)
+}
+
+/// The wall of the cup from the bottom to `height` metres, open at both ends.
+fn wall_mesh(height: f64) -> Mesh {
+    let columns = 0..WALL_COLUMNS;
+    let vertices = columns.clone().flat_map(|i| [wall_point(i, 0.0), wall_point(i, height)]);
+    let triangles = columns.flat_map(|i| {
+        let (left, right) = (2 * i as u32, 2 * ((i + 1) % WALL_COLUMNS) as u32);
+        let [a, b, c, d] = [left, right, right + 1, left + 1];
+        [[a, b, c], [a, c, d]]
+    });
+    Mesh::new(vertices.collect(), triangles.collect())
 }
 
 #[test]
 fn half_of_a_cup_is_missing() {
-    // A wall 80 mm high, open at both ends, at 1.5 mm; the mesh reaches to three spacings below the
-    // middle.
-    let (radius, spacing) = (0.04, 0.0015);
-    let round = (TAU * radius / spacing).round() as usize;
-    let wall = |i: usize, z: f64| {
-        let (sin, cos) = (TAU * i as f64 / round as f64).sin_cos();
-        Vec3::new(radius * cos, radius * sin, z)
-    };
-    let rows = (0.08 / spacing).round() as usize;
-    let row = |j: usize| (0..round).map(move |i| wall(i, (j as f64 + 0.5) * spacing));
-    let cloud = cloud_of((0..rows).flat_map(row));
-    let mesh_to = |height: f64| {
-        let at = |i: usize, k: usize| ((i % round) * 2 + k) as u32;
-        let vertices = (0..round).flat_map(|i| [wall(i, 0.0), wall(i, height)]).collect();
-        let triangles = (0..round).flat_map(|i| {
-            let [a, b, c, d] = [at(i, 0), at(i + 1, 0), at(i + 1, 1), at(i, 1)];
-            [[a, b, c], [a, c, d]]
-        });
-        Mesh::new(vertices, triangles.collect())
-    };
-    let reach = 3.0 * spacing;
-    let half = share(&cloud, &mesh_to(0.04 - reach));
+    // The wall is measured up to 80 mm; the mesh reaches to three spacings below the middle.
+    let mut points = Vec::new();
+    for row in 0..(0.08 / WALL_SPACING).round() as usize {
+        let z = (row as f64 + 0.5) * WALL_SPACING;
+        points.extend((0..WALL_COLUMNS).map(|column| wall_point(column, z)));
+    }
+    let cloud = cloud_of(points);
+    let reach = 3.0 * WALL_SPACING;
+    let half = share(&cloud, &wall_mesh(0.04 - reach));
     assert!((half - 0.5).abs() < 0.05, "{half}");
-    let verdict = |height: f64| ModelVerdict::new(None, &cloud, &mesh_to(height - reach));
-    assert_eq!(verdict(0.05).distrust(), None);
-    let reason = verdict(0.03).distrust().unwrap();
+    let [trusted, distrusted] =
+        [0.05, 0.03].map(|height| ModelVerdict::new(None, &cloud, &wall_mesh(height - reach)));
+    assert_eq!(trusted.distrust_reason(), None);
+    let reason = distrusted.distrust_reason().unwrap();
     assert!(reason.contains("of the surface that was measured"), "{reason}");
 }
 
@@ -138,11 +153,11 @@ fn a_fragment_and_lone_outliers() {
 fn threads_and_the_number_of_points_in_one_place_change_nothing() {
     let mesh = part(&test_shapes::sphere(0.05, 4), |v| v.z > 0.0);
     let cloud = ball(3000);
-    let with = |threads: usize| {
+    let [one, three] = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| share(&cloud, &mesh))
-    };
-    assert_eq!(with(1), with(3));
+    });
+    assert_eq!(one, three);
     let mut heavy = cloud.clone();
     for _ in 0..3000 {
         heavy.push(Vec3::new(0.0, 0.0, -0.05), Vec3::z(), 1e-4, 1);
@@ -151,17 +166,17 @@ fn threads_and_the_number_of_points_in_one_place_change_nothing() {
     assert_eq!(share(&cloud_of([Vec3::zeros(); 5]), &mesh), 0.0);
 }
 
+fn verdict(all: usize, accepted: usize, cells_explained: Option<f64>) -> ModelVerdict {
+    ModelVerdict { scans: ScanCount::new(all, accepted), cells_explained }
+}
+
 #[test]
 fn the_verdict_says_what_was_wrong_and_what_to_do() {
-    let verdict = |all, accepted, cells_explained| ModelVerdict {
-        scans: ScanCount::new(all, accepted),
-        cells_explained,
-    };
     for good in [verdict(4, 2, Some(0.5)), verdict(9, 9, None), verdict(0, 0, Some(1.0))] {
-        assert_eq!(good.distrust(), None, "{good:?}");
+        assert_eq!(good.distrust_reason(), None, "{good:?}");
         assert!(!good.summary().contains("NOT"), "{}", good.summary());
     }
-    let reason = verdict(42, 12, Some(0.123)).distrust().unwrap();
+    let reason = verdict(42, 12, Some(0.123)).distrust_reason().unwrap();
     for text in ["12 of 42 scans (28.6 %)", "12.3 % of the surface", "check", "take more scans"] {
         assert!(reason.contains(text), "no {text} in {reason}");
     }
@@ -175,12 +190,12 @@ fn facts_tell_the_verdict_again() {
     for (all, accepted, cells_explained) in [(42, 12, Some(0.25)), (0, 0, Some(0.75)), (3, 3, None)]
     {
         let verdict = ModelVerdict { scans: ScanCount::new(all, accepted), cells_explained };
-        let facts = verdict.facts();
-        assert_eq!(ModelVerdict::from_facts(&facts), verdict);
-        assert_eq!(facts["trustworthy"], verdict.distrust().is_none());
-        assert_eq!(facts["not_trustworthy_because"].is_null(), verdict.distrust().is_none());
+        let facts = verdict.to_json();
+        assert_eq!(ModelVerdict::from_json(&facts), verdict);
+        assert_eq!(facts["trustworthy"], verdict.distrust_reason().is_none());
+        assert_eq!(facts["not_trustworthy_because"].is_null(), verdict.distrust_reason().is_none());
     }
-    let facts = ModelVerdict { scans: ScanCount::new(4, 3), cells_explained: None }.facts();
+    let facts = ModelVerdict { scans: ScanCount::new(4, 3), cells_explained: None }.to_json();
     assert_eq!((&facts["scans"], &facts["accepted"]), (&4.into(), &3.into()));
     assert_eq!(facts["share_of_scans_accepted"], 0.75);
     assert!(facts["share_of_cells_explained"].is_null());

@@ -1,7 +1,9 @@
 //! Closed loops before simulated objects.
 
 use super::*;
-use crate::geometry::{Scan, SensorModel, StereoModel, StriperModel, Surface, Twist, exp};
+use crate::geometry::{
+    Pose, Scan, SensorModel, StereoModel, StriperModel, Surface, Twist, Vec3, exp,
+};
 use crate::simulate::{NoiseFamily, SimulateParams, Simulator, objects};
 use std::time::Instant;
 
@@ -14,7 +16,7 @@ struct Setup {
 
 impl Setup {
     fn new(object: &str, family: NoiseFamily) -> Setup {
-        let truth = objects::make(object).unwrap();
+        let truth = objects::make_object(object).unwrap();
         let params = SimulateParams { family, ..SimulateParams::default() };
         let surface = Surface::new(&truth.vertices, &truth.triangles).unwrap();
         Setup { simulator: Simulator::new(&truth, &params, 1).unwrap(), surface, truth, family }
@@ -32,32 +34,35 @@ impl Setup {
         space
     }
 
-    /// Vertices of the true surface that any of 200 views above the table sees at less than 75 degrees.
+    /// Vertices of the true surface that any of 200 views above the table sees at less than 75
+    /// degrees.
     fn observable(&self) -> Vec<Vec3> {
         let views = self.simulator.view_poses(400).into_iter().take(200);
         let eyes: Vec<Vec3> = views.map(|pose| pose.translation.vector).collect();
-        let seen = |&i: &usize| {
-            let (p, normal) = (self.truth.vertices[i], self.truth.normals[i]);
-            eyes.iter().any(|eye| {
-                let (sight, far) = ((p - eye).normalize(), (p - eye).norm());
-                sight.dot(&normal) < -0.26
-                    && self.surface.cast_ray(eye, &sight, far - 1e-4).is_none()
-            })
-        };
         let some = (0..self.truth.vertices.len()).step_by(17);
-        some.filter(seen).map(|i| self.truth.vertices[i]).collect()
+        some.filter(|&i| eyes.iter().any(|eye| self.is_seen(i, eye)))
+            .map(|i| self.truth.vertices[i])
+            .collect()
+    }
+
+    /// Whether vertex `i` is seen from `eye` at less than 75 degrees.
+    fn is_seen(&self, i: usize, eye: &Vec3) -> bool {
+        let (p, normal) = (self.truth.vertices[i], self.truth.normals[i]);
+        let (sight, far) = ((p - eye).normalize(), (p - eye).norm());
+        sight.dot(&normal) < -0.26 && self.surface.cast_ray(eye, &sight, far - 1e-4).is_none()
     }
 }
 
-/// Share of the points with a satisfied voxel's centre within 1.5 voxels: at most one voxel from its side.
+/// Share of the points with a satisfied voxel's centre within 1.5 voxels: at most one voxel from
+/// its side.
 fn covered(space: &ViewSpace, points: &[Vec3]) -> f64 {
     let voxels = space.voxels();
     let satisfied: Vec<Vec3> = voxels.iter().filter(|v| v.2).map(|v| v.0).collect();
     let tree = crate::geometry::KdTree::new(&satisfied);
-    let near = |p: &&Vec3| {
+    let near = points.iter().filter(|p| {
         tree.nearest(p).is_some_and(|n| (satisfied[n.0] - **p).norm() <= 1.5 * space.edge())
-    };
-    points.iter().filter(near).count() as f64 / points.len() as f64
+    });
+    near.count() as f64 / points.len() as f64
 }
 
 fn above_table(pose: &Pose) -> Result<ReachedView, RefusedView> {
@@ -83,8 +88,8 @@ impl Run {
     }
 }
 
-/// Plans and scans until done, at most `most` views; poses are off by `pose_error` metres and five times as many
-/// radians per axis, uniformly.
+/// Plans and scans until done, at most `most` views; poses are off by `pose_error` metres and five
+/// times as many radians per axis, uniformly.
 fn run(setup: &Setup, params: &ViewParams, points: &[Vec3], most: usize, pose_error: f64) -> Run {
     let mut space = setup.space(params);
     let (mut integrate, mut plan_time, mut coverage) = (0.0, 0.0, Vec::new());
@@ -99,7 +104,7 @@ fn run(setup: &Setup, params: &ViewParams, points: &[Vec3], most: usize, pose_er
         };
         let scan = setup.simulator.scan(views, &view.pose);
         let off = Twist::from_fn(|i, _| {
-            let number = measure::scramble(5, views as u64, i as u64) as f64 / u64::MAX as f64;
+            let number = random::hash_of_three(5, views as u64, i as u64) as f64 / u64::MAX as f64;
             (2.0 * number - 1.0) * pose_error * if i < 3 { 1.0 } else { 5.0 }
         });
         let start = Instant::now();
@@ -130,7 +135,7 @@ fn the_stereo_pair_does_in_spite_of_noise_and_poses_and_chance_is_slower() {
     let planned = run(&setup, &ViewParams::default(), &points, 40, 1e-3);
     assert!(planned.last.done.is_some(), "not done after {}", planned.coverage.len());
     assert!(*planned.coverage.last().unwrap() > 0.98, "{:?}", planned.coverage);
-    let chance = ViewParams { measure: Measure::Random, ..ViewParams::default() };
+    let chance = ViewParams { measure: GainMeasure::Random, ..ViewParams::default() };
     let chance = run(&setup, &chance, &points, 12, 1e-3);
     let share = 0.95;
     assert!(
@@ -147,18 +152,18 @@ fn plans_do_not_depend_on_the_number_of_threads() {
         let first = next_view(&setup.space(&ViewParams::default()), &mut |p| above_table(p));
         let pose = first.chosen.unwrap().pose;
         let scan: Scan = setup.simulator.scan(0, &pose).scan;
-        let plan = |threads: usize, measure: Measure| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let mut space = setup.space(&ViewParams { measure, ..ViewParams::default() });
-                space.integrate(&scan, &pose).unwrap();
-                let plan = next_view(&space, &mut |pose| above_table(pose));
-                assert!(plan.chosen.is_some());
-                (plan, space.voxels())
-            })
-        };
-        for measure in [Measure::Thesis, Measure::MassiosFisher, Measure::Entropy] {
-            assert!(plan(1, measure) == plan(2, measure), "{family:?} {measure:?}");
+        for measure in [GainMeasure::Thesis, GainMeasure::MassiosFisher, GainMeasure::Entropy] {
+            let [one, two] = [1, 2].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    let mut space = setup.space(&ViewParams { measure, ..ViewParams::default() });
+                    space.integrate(&scan, &pose).unwrap();
+                    let plan = next_view(&space, &mut |pose| above_table(pose));
+                    assert!(plan.chosen.is_some());
+                    (plan, space.voxels())
+                })
+            });
+            assert!(one == two, "{family:?} {measure:?}");
         }
     }
 }
@@ -170,7 +175,7 @@ fn figures_of_closed_loops() {
         for object in ["filter", "coffee", "mug", "gear"] {
             let setup = Setup::new(object, family);
             let points = setup.observable();
-            for word in <Measure as crate::params::ParamValue>::CHOICES {
+            for word in <GainMeasure as crate::params::ParamValue>::CHOICES {
                 let mut params = ViewParams::default();
                 params.set("measure", &serde_json::json!(word)).unwrap();
                 let run = run(&setup, &params, &points, 60, pose_error);
@@ -202,7 +207,7 @@ fn figures_of_one_scan() {
     for voxel_edge in [0.004, 0.002, 0.001] {
         let mut space = setup.space(&ViewParams { voxel_edge, ..ViewParams::default() });
         let start = Instant::now();
-        let carved = pool.install(|| carve::carve(&space.grid, &scan, &pose, 3));
+        let evidence = pool.install(|| carving::carve(&space.grid, &scan, &pose, 3));
         let carve = start.elapsed().as_secs_f64();
         let start = Instant::now();
         pool.install(|| space.integrate(&scan, &pose)).unwrap();
@@ -211,7 +216,7 @@ fn figures_of_one_scan() {
             scan.points.len(),
             scan.returns().count(),
             carve * 1e3,
-            carved.hits.len(),
+            evidence.hits.len(),
             start.elapsed().as_secs_f64() * 1e3,
             space.memory() / 1000
         );

@@ -1,12 +1,12 @@
 //! The syntax of the files, and what is said of broken ones.
 
 use crate::model::{Base, Count, Kind, Part, Primitive, Value};
-use crate::{Package, generate, parse};
+use crate::{Package, file_syntax, generate};
 use std::fs;
 use std::path::Path;
 
 fn message(text: &str) -> Result<Part, String> {
-    let parts = parse::file(text, Kind::Msg, "own", Path::new("own/msg/A.msg"));
+    let parts = file_syntax::read(text, Kind::Msg, "own", Path::new("own/msg/A.msg"));
     parts.map(|mut parts| parts.remove(0)).map_err(|e| e.to_string())
 }
 
@@ -161,7 +161,7 @@ fn octets_go_in_one_piece_and_fixed_arrays_without_a_count() {
     let code = generated(&[("msg/A.msg", text)]).unwrap();
     assert_eq!(code.matches("with = \"::serde_bytes\"").count(), 3);
     assert!(code.contains("    /// `uint8[4] e`\n    pub e: [u8; 4],"));
-    assert!(code.contains("#[serde(with = \"crate::wire::array\")]\n    pub f: [u8; 40],"));
+    assert!(code.contains("#[serde(with = \"crate::field_serde::array\")]\n    pub f: [u8; 40],"));
     assert!(code.contains("serialize_sequence::<4, _, _>"));
 }
 

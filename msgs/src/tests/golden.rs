@@ -1,4 +1,5 @@
-//! Every type against bytes and values from another implementation (tests/independent/cdr_check.py).
+//! Every type against bytes and values from another implementation
+//! (tests/independent/cdr_check.py).
 
 use crate::{Interface, TypeVisitor, cdr, definitions, visit_types};
 use serde_json::Value;
@@ -17,8 +18,8 @@ fn golden() -> BTreeMap<String, Golden> {
     lines
         .map(|line| {
             let [name, hex, values] = line.split('\t').collect::<Vec<_>>().try_into().unwrap();
-            let byte = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
-            let bytes = (0..hex.len()).step_by(2).map(byte).collect();
+            let bytes = (0..hex.len()).step_by(2).map(|at| &hex[at..at + 2]);
+            let bytes = bytes.map(|digits| u8::from_str_radix(digits, 16).unwrap()).collect();
             (name.to_string(), Golden { bytes, values: serde_json::from_str(values).unwrap() })
         })
         .collect()

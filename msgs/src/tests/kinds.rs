@@ -39,6 +39,17 @@ fn defaults_are_those_of_the_file() {
     assert_eq!(crate::geometry_msgs::msg::Quaternion::default().w, 1.0);
 }
 
+/// Reads `json` with another value of one field.
+fn read_with(
+    json: &serde_json::Value,
+    field: &str,
+    value: serde_json::Value,
+) -> serde_json::Result<Everything> {
+    let mut json = json.clone();
+    json[field] = value;
+    serde_json::from_value(json)
+}
+
 #[test]
 fn bounds_hold_when_writing_and_when_reading() {
     let ways: [fn(&mut Everything); 5] = [
@@ -55,16 +66,11 @@ fn bounds_hold_when_writing_and_when_reading() {
         assert!(error.contains("its type allows"), "{error}");
     }
     let json = serde_json::to_value(Everything::default()).unwrap();
-    let with = |field: &str, value: serde_json::Value| {
-        let mut json = json.clone();
-        json[field] = value;
-        serde_json::from_value::<Everything>(json)
-    };
-    assert!(with("few_numbers", vec![1, 2, 3].into()).is_ok());
-    assert!(with("few_numbers", vec![1, 2, 3, 4].into()).is_err());
-    assert!(with("short_text", "12345678".into()).is_ok());
-    assert!(with("short_text", "123456789".into()).is_err());
-    assert!(with("covariance", vec![0.0; 35].into()).is_err());
+    assert!(read_with(&json, "few_numbers", vec![1, 2, 3].into()).is_ok());
+    assert!(read_with(&json, "few_numbers", vec![1, 2, 3, 4].into()).is_err());
+    assert!(read_with(&json, "short_text", "12345678".into()).is_ok());
+    assert!(read_with(&json, "short_text", "123456789".into()).is_err());
+    assert!(read_with(&json, "covariance", vec![0.0; 35].into()).is_err());
 }
 
 #[test]

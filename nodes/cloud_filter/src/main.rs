@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(cloud_filter::run)
+    puffer_ros::main(cloud_filter::run)
 }

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(mesh_reconstructor::run)
+    puffer_ros::main(mesh_reconstructor::run)
 }

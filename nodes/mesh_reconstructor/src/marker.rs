@@ -1,36 +1,27 @@
-//! The mesh as a marker, for those who watch.
+//! The mesh as a marker for RViz and other viewers.
 
 use puffer_core::mesh::io::{confidence_colour, confidence_scale};
-use puffer_core::mesh::{Mesh, clustered};
+use puffer_core::mesh::{Mesh, simplify_by_clustering};
 use puffer_msgs::geometry_msgs::msg::{Point, Vector3};
 use puffer_msgs::std_msgs::msg::{ColorRGBA, Header};
 use puffer_msgs::visualization_msgs::msg::Marker;
-use puffer_shell::convert::point_message;
+use puffer_ros::conversions::point_message;
 
 /// Colour of a mesh without sigma.
-const GREY: [u8; 3] = [215, 215, 220];
+const UNKNOWN_SIGMA_COLOUR: [u8; 3] = [215, 215, 220];
 
-/// Bytes of a triangle: three corners of three numbers and a colour each.
-const TRIANGLE: usize = 3 * (24 + 16);
-/// Bytes of everything else.
-const FRAME: usize = 1000;
+/// Bytes of a triangle in the message: three corners of three numbers and a colour each.
+const TRIANGLE_BYTES: usize = 3 * (24 + 16);
+/// Bytes of the message without its triangles, at most.
+const OVERHEAD_BYTES: usize = 1000;
 
-/// The mesh as triangles with a colour at each corner: green to red by sigma, as in its files, and red where nothing was
-/// measured; with fewer triangles if it would take more than `most_bytes`.
+/// The mesh as triangles with a colour at each corner: green to red by sigma, as in its files, and
+/// red where nothing was measured; with fewer triangles if it would take more than `most_bytes`.
 pub(crate) fn mesh_marker(mesh: &Mesh, header: Header, most_bytes: usize) -> Marker {
     // The colours' scale is that of the whole mesh.
     let scale = confidence_scale(&mesh.sigma);
-    let mesh = &clustered(mesh, most_bytes.saturating_sub(FRAME) / TRIANGLE);
-    let colour = |vertex: usize| {
-        let unobserved = mesh.observed.get(vertex) == Some(&false);
-        let [r, g, b] = match mesh.sigma.get(vertex) {
-            _ if unobserved => confidence_colour(f64::NAN, scale),
-            Some(sigma) => confidence_colour(*sigma, scale),
-            None => GREY,
-        };
-        let channel = |byte: u8| f32::from(byte) / 255.0;
-        ColorRGBA { r: channel(r), g: channel(g), b: channel(b), a: 1.0 }
-    };
+    let mesh =
+        &simplify_by_clustering(mesh, most_bytes.saturating_sub(OVERHEAD_BYTES) / TRIANGLE_BYTES);
     let corners: Vec<usize> = mesh.triangles.as_flattened().iter().map(|v| *v as usize).collect();
     let points: Vec<Point> = corners.iter().map(|v| point_message(&mesh.vertices[*v])).collect();
     let mut marker = Marker {
@@ -40,11 +31,23 @@ pub(crate) fn mesh_marker(mesh: &Mesh, header: Header, most_bytes: usize) -> Mar
         scale: Vector3 { x: 1.0, y: 1.0, z: 1.0 },
         color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
         points,
-        colors: corners.into_iter().map(colour).collect(),
+        colors: corners.into_iter().map(|v| vertex_colour(mesh, v, scale)).collect(),
         ..Marker::default()
     };
     marker.pose.orientation.w = 1.0;
     marker
+}
+
+/// The colour of a vertex on the scale of the whole mesh.
+fn vertex_colour(mesh: &Mesh, vertex: usize, scale: f64) -> ColorRGBA {
+    let unobserved = mesh.observed.get(vertex) == Some(&false);
+    let colour = match mesh.sigma.get(vertex) {
+        _ if unobserved => confidence_colour(f64::NAN, scale),
+        Some(sigma) => confidence_colour(*sigma, scale),
+        None => UNKNOWN_SIGMA_COLOUR,
+    };
+    let [r, g, b] = colour.map(|byte| f32::from(byte) / 255.0);
+    ColorRGBA { r, g, b, a: 1.0 }
 }
 
 #[cfg(test)]
@@ -73,14 +76,13 @@ mod tests {
     #[test]
     fn a_marker_fits_the_bytes_that_there_are() {
         // A sheet of 5,000 triangles.
-        let at = |x: u32, y: u32| y * 51 + x;
-        let corner = |k: u32| Vec3::new(f64::from(k % 51), f64::from(k / 51), 0.0) * 1e-3;
-        let squares = (0..50).flat_map(|y| (0..50).map(move |x| (x, y)));
-        let triangles = squares.flat_map(|(x, y)| {
-            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+        let corners = (0..51 * 51).map(|k| Vec3::new(f64::from(k % 51), f64::from(k / 51), 0.0));
+        let squares = (0..50).flat_map(|y| (0..50).map(move |x| y * 51 + x));
+        let triangles = squares.flat_map(|a| {
+            let [b, c, d] = [a + 1, a + 52, a + 51];
             [[a, b, c], [a, c, d]]
         });
-        let mesh = Mesh::new((0..51 * 51).map(corner).collect(), triangles.collect());
+        let mesh = Mesh::new(corners.map(|p| p * 1e-3).collect(), triangles.collect());
         for most_bytes in [1_000_000, 212_992] {
             let marker = mesh_marker(&mesh, Header::default(), most_bytes);
             let bytes = puffer_msgs::cdr::to_bytes(&marker).unwrap().len();

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(mock_driver::run)
+    puffer_ros::main(mock_driver::run)
 }

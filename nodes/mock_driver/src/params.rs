@@ -1,9 +1,9 @@
 //! Parameters of the mock driver.
 
-use puffer_core::robot::SETUPS;
+use puffer_core::robot::SETUP_NAMES;
 
 puffer_core::choice! {
-    /// A set-up.
+    /// The robot and sensor that are simulated.
     pub enum Setup {
         /// KUKA KR 16-2 with a laser striper; the object stands on a table.
         Kr16Laser = "kr16_laser",
@@ -13,26 +13,29 @@ puffer_core::choice! {
 }
 
 impl Setup {
-    /// Its name.
+    /// Its name in [`SETUP_NAMES`].
     pub fn name(self) -> &'static str {
-        SETUPS[self as usize]
+        SETUP_NAMES[self as usize]
     }
 }
 
 puffer_core::params! {
     /// What is simulated, and how fast.
     pub struct DriverParams("driver") {
-        /// Robot and sensor.
+        /// Robot and sensor that are simulated.
         setup: Setup = Setup::Kr16Laser;
-        /// Object by name (`puffer objects`), or a closed mesh file in metres.
+        /// Object to be scanned: a name that `puffer objects` lists, or the path of a closed mesh
+        /// file in metres.
         object: String = "coffee".to_owned();
-        /// Seed of noise, outliers, drop-outs and pose errors.
+        /// Seed of the random noise, outliers, drop-outs and pose errors.
         seed: usize = 0, in [0, 9007199254740991_u64];
-        /// Seconds that the robot moves while a second passes on the clock on the wall.
+        /// Simulated seconds per second of wall clock while the robot moves.
         speed_up: f64 = 10.0, in [0.1, 1000.0];
-        /// Joint states and transforms a simulated second while the robot moves.
+        /// Rate at which joint states and transforms are published while the robot moves, per
+        /// simulated second.
         rate: f64 = 20.0, in [1.0, 1000.0], unit "Hz";
-        /// Folder for the truth (truth.ply at the start, seen.ply at the end); empty: none is written.
+        /// Folder for the true mesh (truth.ply, written at the start) and the points that the scans
+        /// saw of it (seen.ply, written at the end); empty for none.
         truth_folder: String = String::new();
     }
 }
@@ -52,7 +55,7 @@ mod tests {
 
     #[test]
     fn the_words_are_the_names_of_the_set_ups() {
-        assert_eq!(Setup::CHOICES, SETUPS);
+        assert_eq!(Setup::CHOICES, SETUP_NAMES);
         assert_eq!(Setup::OmnirobStereo.name(), "omnirob_stereo");
     }
 }

@@ -1,22 +1,23 @@
 //! The action `model_object`.
 
-use crate::Params;
 use crate::busy::Busy;
-use crate::inbox::Inbox;
 use crate::journal::Journal;
-use crate::partners::Partners;
-use crate::runner::{End, Runner, phase_constant};
+use crate::node_clients::NodeClients;
+use crate::params::Params;
+use crate::report::{End, model_verdict};
+use crate::runner::Runner;
+use crate::scan_inbox::ScanInbox;
 use puffer_core::geometry::Aabb;
-use puffer_core::session::{Event, Outcome as Ended, Phase, SessionParams, State};
+use puffer_core::session::{Event, Phase, SessionOutcome, SessionParams, SessionState};
 use puffer_msgs::action::{
     ModelObject, ModelObjectFeedback, ModelObjectGoal, ModelObjectResult, ReconstructMeshResult,
 };
-use puffer_msgs::builtin_interfaces::msg::{Duration as DurationMessage, Time};
+use puffer_msgs::builtin_interfaces::msg::Duration as DurationMessage;
 use puffer_msgs::msg::ModellingStatus;
 use puffer_msgs::srv::ReconstructResponse;
 use puffer_msgs::std_msgs::msg::Header;
-use puffer_shell::convert::region_from_message;
-use puffer_shell::{Goal, Node, Outcome, Publisher};
+use puffer_ros::conversions::region_from_message;
+use puffer_ros::{Goal, Node, Outcome, Publisher};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
@@ -24,10 +25,10 @@ use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 /// The modeller, ready for goals.
 pub(crate) struct Modeller {
     pub node: Node<Params>,
-    pub partners: Partners,
-    pub inbox: Arc<Inbox>,
+    pub clients: NodeClients,
+    pub inbox: Arc<ScanInbox>,
     pub status: Publisher<ModellingStatus>,
-    /// Where the running session takes its controls.
+    /// The operator's controls of the running session.
     pub controls: Mutex<Option<UnboundedSender<Event>>>,
     /// Whether a session is running, or its last steps alone.
     pub busy: Busy,
@@ -40,6 +41,18 @@ struct Fault {
     error: anyhow::Error,
 }
 
+impl Fault {
+    /// The run folder cannot be written.
+    fn in_run_folder(error: anyhow::Error) -> Fault {
+        Fault { error_code: ModelObjectResult::RUN_FOLDER, error }
+    }
+
+    /// A node does not answer.
+    fn of_silent_node(error: anyhow::Error) -> Fault {
+        Fault { error_code: ModelObjectResult::NODE_MISSING, error }
+    }
+}
+
 impl Modeller {
     /// Sends a control to the running session; false if there is none.
     pub(crate) fn control(&self, event: Event) -> bool {
@@ -47,6 +60,7 @@ impl Modeller {
         controls.as_ref().is_some_and(|sender| sender.send(event).is_ok())
     }
 
+    /// Works on a goal to its end.
     pub(crate) async fn model(&self, goal: Goal<ModelObject>) -> Outcome<ModelObjectResult> {
         let (sender, controls) = unbounded_channel();
         *self.controls.lock().unwrap_or_else(PoisonError::into_inner) = Some(sender.clone());
@@ -59,10 +73,12 @@ impl Modeller {
             }
         });
         let since = Instant::now();
-        let told = |state: &State, message: &str| self.tell(&goal, state, message, since);
-        let outcome = match self.run(&goal, controls, told).await {
-            Ok((end, result)) => finished(end, result),
-            Err(Fault { error_code, error }) => failed(error_code, format!("{error:#}")),
+        let ended = self.run(&goal, controls, |state, message| {
+            self.publish_status(&goal, state, message, since);
+        });
+        let outcome = match ended.await {
+            Ok((end, result)) => ended_outcome(end, result),
+            Err(Fault { error_code, error }) => failed_outcome(error_code, format!("{error:#}")),
         };
         watch.abort();
         *self.controls.lock().unwrap_or_else(PoisonError::into_inner) = None;
@@ -73,64 +89,52 @@ impl Modeller {
         &self,
         goal: &Goal<ModelObject>,
         controls: tokio::sync::mpsc::UnboundedReceiver<Event>,
-        told: impl FnMut(&State, &str),
+        on_state: impl FnMut(&SessionState, &str),
     ) -> Result<(End, ModelObjectResult), Fault> {
         let since = Instant::now();
         let params = self.node.params();
-        // Whoever asks to end while partners are awaited is heard at once.
+        // A cancel request ends the wait for the nodes at once.
         tokio::select! {
-            ready = self.ready() => ready?,
+            ready = self.prepare_nodes() => ready?,
             () = goal.cancelled() => {}
         }
         self.inbox.clear();
-        let run_folder = |error| Fault { error_code: ModelObjectResult::RUN_FOLDER, error };
-        let journal = Journal::begin(&params, self.node.now()).map_err(run_folder)?;
-        let asked = goal.request().clone();
-        let mut runner = Runner::new(&self.node, &self.partners, &self.inbox, journal, asked);
+        let journal = Journal::create(&params, self.node.now()).map_err(Fault::in_run_folder)?;
+        let (request, stop) = (goal.request().clone(), self.node.stop());
+        let session = SessionState::new(session_params(&params, &request));
+        let mut runner = Runner::new(&self.clients, &self.inbox, journal, request, stop);
         let first = if goal.is_cancelled() { Event::Cancel } else { Event::Ready };
-        let end = runner.run(session(&params, goal.request()), first, controls, told).await;
-        runner.report(&end).map_err(run_folder)?;
-        let mesh = &runner.mesh;
-        let verdict = runner.verdict_on_all(&end);
-        let share = |share: Option<f64>| share.map_or(f32::NAN, |share| share as f32);
+        let end = runner.run(session, first, controls, on_state).await;
+        runner.write_report(&end).map_err(Fault::in_run_folder)?;
         let result = ModelObjectResult {
-            success: mesh.success,
-            error_code: error_code_of(&end.outcome, mesh),
-            error_msg: mesh.error_msg.clone(),
-            mesh_path: mesh.mesh_path.clone(),
-            vertices: mesh.vertices,
-            triangles: mesh.triangles,
-            genus: mesh.genus,
-            closed: mesh.closed,
-            mean_sigma: mesh.mean_sigma,
-            unobserved_share: mesh.unobserved_share,
             seconds: since.elapsed().as_secs_f32(),
             run_folder: runner.journal.folder(),
-            scans: end.state.scans as u32,
-            coverage: end.state.coverage as f32,
-            reason: end.state.reason.clone(),
-            accepted: verdict.scans.map_or(0, |scans| scans.accepted() as u32),
-            share_of_scans_accepted: share(verdict.scans.map(|scans| scans.share())),
-            share_of_cells_explained: share(verdict.cells_explained),
+            ..result_of(&end, &runner.mesh)
         };
         Ok((end, result))
     }
 
-    /// Waits until all partners are there and have forgotten earlier scans.
-    async fn ready(&self) -> Result<(), Fault> {
-        self.partners.ready().await.map_err(|error| {
-            let error_code = if self.partners.has_driver() {
+    /// Waits until all nodes are there and have forgotten earlier scans.
+    async fn prepare_nodes(&self) -> Result<(), Fault> {
+        self.clients.wait_for_all().await.map_err(|error| {
+            let error_code = if self.clients.has_driver() {
                 ModelObjectResult::NODE_MISSING
             } else {
                 ModelObjectResult::NO_DRIVER
             };
             Fault { error_code, error }
         })?;
-        let silent = |error| Fault { error_code: ModelObjectResult::NODE_MISSING, error };
-        self.partners.reset().await.map_err(silent)
+        self.clients.reset_scans().await.map_err(Fault::of_silent_node)
     }
 
-    fn tell(&self, goal: &Goal<ModelObject>, state: &State, message: &str, since: Instant) {
+    /// Publishes the state as the goal's feedback and as `modelling_status`.
+    fn publish_status(
+        &self,
+        goal: &Goal<ModelObject>,
+        state: &SessionState,
+        message: &str,
+        since: Instant,
+    ) {
         let feedback = ModelObjectFeedback {
             phase: phase_constant(state.phase),
             scans: state.scans as u32,
@@ -139,9 +143,8 @@ impl Modeller {
             elapsed: DurationMessage::from_seconds(since.elapsed().as_secs_f64()),
             message: message.to_owned(),
         };
-        let (sec, nanosec) = self.node.now().parts();
         let status = ModellingStatus {
-            header: Header { stamp: Time { sec, nanosec }, frame_id: String::new() },
+            header: Header { stamp: self.node.now().into(), frame_id: String::new() },
             phase: feedback.phase,
             scans: feedback.scans,
             coverage: feedback.coverage,
@@ -156,8 +159,8 @@ impl Modeller {
     }
 }
 
-/// The session that a goal asks for.
-fn session(params: &Params, goal: &ModelObjectGoal) -> SessionParams {
+/// The parameters of the session that a goal asks for: the configured ones where it names none.
+fn session_params(params: &Params, goal: &ModelObjectGoal) -> SessionParams {
     let mut session = params.session.clone();
     if goal.max_scans > 0 {
         session.max_scans = goal.max_scans as usize;
@@ -171,8 +174,11 @@ fn session(params: &Params, goal: &ModelObjectGoal) -> SessionParams {
     session
 }
 
-/// What is wrong with a goal, in words.
-pub(crate) fn check(goal: &ModelObjectGoal) -> std::result::Result<(), String> {
+/// Checks a goal.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub(crate) fn check_goal(goal: &ModelObjectGoal) -> std::result::Result<(), String> {
     for (name, value) in [("coverage", goal.coverage), ("sigma", goal.sigma)] {
         if !value.is_finite() || value < 0.0 {
             return Err(format!(
@@ -183,17 +189,63 @@ pub(crate) fn check(goal: &ModelObjectGoal) -> std::result::Result<(), String> {
     region_from_message(&goal.roi, &Aabb::EMPTY).map(drop)
 }
 
-fn finished(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResult> {
+/// The result of a session that ended with `mesh`, but for time and folder.
+fn result_of(end: &End, mesh: &ReconstructMeshResult) -> ModelObjectResult {
+    let verdict = model_verdict(end, mesh);
+    ModelObjectResult {
+        success: mesh.success,
+        error_code: error_code(&end.outcome, mesh),
+        error_msg: mesh.error_msg.clone(),
+        mesh_path: mesh.mesh_path.clone(),
+        vertices: mesh.vertices,
+        triangles: mesh.triangles,
+        genus: mesh.genus,
+        closed: mesh.closed,
+        mean_sigma: mesh.mean_sigma,
+        unobserved_share: mesh.unobserved_share,
+        scans: end.state.scans as u32,
+        coverage: end.state.coverage as f32,
+        reason: end.state.reason.clone(),
+        accepted: verdict.scans.map_or(0, |scans| scans.accepted() as u32),
+        share_of_scans_accepted: share_message(verdict.scans.map(|scans| scans.share())),
+        share_of_cells_explained: share_message(verdict.cells_explained),
+        ..ModelObjectResult::default()
+    }
+}
+
+/// A share as messages have it: NaN where it is not known.
+fn share_message(share: Option<f64>) -> f32 {
+    share.map_or(f32::NAN, |share| share as f32)
+}
+
+/// The constant of a phase in `ModelObject.action`.
+fn phase_constant(phase: Phase) -> u8 {
+    match phase {
+        Phase::Preparing => ModelObjectFeedback::PREPARING,
+        Phase::Planning => ModelObjectFeedback::PLANNING,
+        Phase::Moving => ModelObjectFeedback::MOVING,
+        Phase::Scanning => ModelObjectFeedback::SCANNING,
+        Phase::Registering => ModelObjectFeedback::REGISTERING,
+        Phase::Refining => ModelObjectFeedback::REFINING,
+        Phase::Filtering => ModelObjectFeedback::FILTERING,
+        Phase::Reconstructing => ModelObjectFeedback::RECONSTRUCTING,
+        Phase::Done => ModelObjectFeedback::DONE,
+        Phase::Paused => ModelObjectFeedback::PAUSED,
+    }
+}
+
+/// The outcome of a goal whose session ended.
+fn ended_outcome(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResult> {
     match end.outcome {
-        Ended::Modelled(reason) => {
+        SessionOutcome::Modelled(reason) => {
             tracing::info!("modelled with {} scans: {reason}", end.state.scans);
             Outcome::Succeeded(result)
         }
-        Ended::Cancelled => {
+        SessionOutcome::Cancelled => {
             result.error_msg = "cancelled".to_owned();
             Outcome::Canceled(result)
         }
-        Ended::Failed(_, why) => {
+        SessionOutcome::Failed(_, why) => {
             tracing::error!("{why}");
             result.error_msg = why;
             Outcome::Aborted(result)
@@ -201,14 +253,15 @@ fn finished(end: End, mut result: ModelObjectResult) -> Outcome<ModelObjectResul
     }
 }
 
-fn error_code_of(outcome: &Ended, mesh: &ReconstructMeshResult) -> u16 {
+/// The error code of a session that ended with `mesh`.
+fn error_code(outcome: &SessionOutcome, mesh: &ReconstructMeshResult) -> u16 {
     let phase = match outcome {
-        Ended::Modelled(_) => return ModelObjectResult::NONE,
-        Ended::Cancelled => return ModelObjectResult::CANCELLED,
-        Ended::Failed(_, _) if mesh.error_code == ReconstructResponse::NOT_TRUSTWORTHY => {
+        SessionOutcome::Modelled(_) => return ModelObjectResult::NONE,
+        SessionOutcome::Cancelled => return ModelObjectResult::CANCELLED,
+        SessionOutcome::Failed(_, _) if mesh.error_code == ReconstructResponse::NOT_TRUSTWORTHY => {
             return ModelObjectResult::NOT_TRUSTWORTHY;
         }
-        Ended::Failed(phase, _) => phase,
+        SessionOutcome::Failed(phase, _) => phase,
     };
     match phase {
         Phase::Preparing | Phase::Paused | Phase::Done => ModelObjectResult::NO_DRIVER,
@@ -219,7 +272,8 @@ fn error_code_of(outcome: &Ended, mesh: &ReconstructMeshResult) -> u16 {
     }
 }
 
-fn failed(error_code: u16, error_msg: String) -> Outcome<ModelObjectResult> {
+/// The outcome of a goal for which there was no session, or no report of it.
+fn failed_outcome(error_code: u16, error_msg: String) -> Outcome<ModelObjectResult> {
     tracing::error!("{error_msg}");
     Outcome::Aborted(ModelObjectResult { error_code, error_msg, ..ModelObjectResult::default() })
 }
@@ -230,14 +284,39 @@ mod tests {
 
     #[test]
     fn a_mesh_that_is_not_trustworthy_has_a_code_of_its_own() {
-        let code = |error_code: u16, outcome: Ended| {
-            error_code_of(&outcome, &ReconstructMeshResult { error_code, ..Default::default() })
+        let failed = SessionOutcome::Failed(Phase::Reconstructing, "why".into());
+        let refused = mesh_with(ReconstructResponse::NOT_TRUSTWORTHY);
+        assert_eq!(error_code(&failed, &refused), ModelObjectResult::NOT_TRUSTWORTHY);
+        let mesh = mesh_with(ReconstructResponse::NONE);
+        assert_eq!(error_code(&failed, &mesh), ModelObjectResult::RECONSTRUCTION);
+        assert_eq!(
+            error_code(&SessionOutcome::Modelled("enough".into()), &mesh),
+            ModelObjectResult::NONE
+        );
+        assert_eq!(error_code(&SessionOutcome::Cancelled, &mesh), ModelObjectResult::CANCELLED);
+    }
+
+    fn mesh_with(error_code: u16) -> ReconstructMeshResult {
+        ReconstructMeshResult { error_code, ..ReconstructMeshResult::default() }
+    }
+
+    #[test]
+    fn a_goal_overrides_what_is_configured_where_it_names_a_value() {
+        let params = Params::default();
+        let same = session_params(&params, &ModelObjectGoal::default());
+        assert_eq!(same, params.session);
+        let goal = ModelObjectGoal {
+            max_scans: 3,
+            coverage: 2.0,
+            sigma: 0.5,
+            ..ModelObjectGoal::default()
         };
-        let failed = || Ended::Failed(Phase::Reconstructing, "why".into());
-        let refused = ReconstructResponse::NOT_TRUSTWORTHY;
-        assert_eq!(code(refused, failed()), ModelObjectResult::NOT_TRUSTWORTHY);
-        assert_eq!(code(0, failed()), ModelObjectResult::RECONSTRUCTION);
-        assert_eq!(code(0, Ended::Modelled("enough".into())), ModelObjectResult::NONE);
-        assert_eq!(code(0, Ended::Cancelled), ModelObjectResult::CANCELLED);
+        let changed = session_params(&params, &goal);
+        assert_eq!((changed.max_scans, changed.coverage, changed.sigma), (3, 1.0, 0.5));
+        assert!(check_goal(&goal).is_ok());
+        for sigma in [-1.0, f32::NAN, f32::INFINITY] {
+            let error = check_goal(&ModelObjectGoal { sigma, ..goal.clone() }).unwrap_err();
+            assert!(error.contains("sigma"), "{error}");
+        }
     }
 }

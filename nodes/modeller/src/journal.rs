@@ -1,35 +1,40 @@
-//! What a run leaves: a scan folder that grows with each scan, and the report.
+//! The run folder: a scan folder that grows with each scan, and the report.
 
-use crate::Params;
+use crate::params::Params;
 use anyhow::{Context, Result};
 use puffer_core::geometry::{Pose, pose_to_rows};
 use puffer_core::params::ParamValue;
-use puffer_core::scans::{ScanFolder, ScanSet, View};
-use puffer_core::view::Cause;
+use puffer_core::scan_files::{ScanFolder, ScanSet, View};
+use puffer_core::view::TerminationCause;
+use puffer_msgs::geometry_msgs::msg::Pose as PoseMessage;
 use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::srv::PlanViewResponse;
-use puffer_shell::Stamp;
-use puffer_shell::convert::{pose_from_message, scan_from_message, status_from_message};
+use puffer_ros::Stamp;
+use puffer_ros::conversions::{pose_from_message, scan_from_message, status_from_message};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// The journal of one run.
+/// What is noted of one run.
 pub(crate) struct Journal {
+    /// `None`: nothing is written.
     folder: Option<PathBuf>,
     scans: Option<ScanFolder>,
+    /// What the report says of each view that was planned, the newest last.
     views: Vec<Map<String, Value>>,
+    /// Wall time of each stage.
     stages: Vec<(&'static str, Duration)>,
     began: Instant,
-    simulated: Stamp,
+    /// When the run began on the robot's clock.
+    began_on_robot: Stamp,
 }
 
 impl Journal {
-    /// Begins a journal at the time `now` of the robot's clock.
+    /// A journal in the configured run folder that begins at the time `now` of the robot's clock.
     ///
     /// # Errors
     /// The run folder cannot be made.
-    pub(crate) fn begin(params: &Params, now: Stamp) -> Result<Journal> {
+    pub(crate) fn create(params: &Params, now: Stamp) -> Result<Journal> {
         let modeller = &params.modeller;
         let folder =
             Some(PathBuf::from(&modeller.run_folder)).filter(|f| !f.as_os_str().is_empty());
@@ -45,8 +50,19 @@ impl Journal {
                 Some(ScanFolder::create(&folder.join("scans"), set)?)
             }
         };
-        let (views, stages) = (Vec::new(), Vec::new());
-        Ok(Journal { folder, scans, views, stages, began: Instant::now(), simulated: now })
+        Ok(Journal { folder, scans, ..Journal::without_folder(now) })
+    }
+
+    /// A journal of which nothing is written.
+    pub(crate) fn without_folder(now: Stamp) -> Journal {
+        Journal {
+            folder: None,
+            scans: None,
+            views: Vec::new(),
+            stages: Vec::new(),
+            began: Instant::now(),
+            began_on_robot: now,
+        }
     }
 
     /// The run folder; empty if there is none.
@@ -54,23 +70,22 @@ impl Journal {
         self.folder.as_deref().unwrap_or(Path::new("")).display().to_string()
     }
 
-    /// Adds up the time of a stage.
-    pub(crate) fn took(&mut self, stage: &'static str, time: Duration) {
+    /// Adds `time` to the wall time of a stage.
+    pub(crate) fn add_stage_time(&mut self, stage: &'static str, time: Duration) {
         match self.stages.iter_mut().find(|(name, _)| *name == stage) {
             Some((_, sum)) => *sum += time,
             None => self.stages.push((stage, time)),
         }
     }
 
-    /// Notes a plan: a view begins with it.
-    pub(crate) fn planned(&mut self, plan: &PlanViewResponse) {
-        let rows = |pose| pose_from_message(pose).map_or(Value::Null, |p| json!(pose_to_rows(&p)));
+    /// Notes a plan, with which a view begins.
+    pub(crate) fn begin_view(&mut self, plan: &PlanViewResponse) {
         let candidates: Vec<Value> = plan
             .candidates
             .iter()
             .map(|c| {
                 json!({
-                    "view": rows(&c.view), "gain": c.gain, "asked": c.asked,
+                    "view": pose_json(&c.view), "gain": c.gain, "asked": c.asked,
                     "reachable": c.reachable, "reason": c.reason,
                 })
             })
@@ -83,9 +98,9 @@ impl Journal {
             .collect();
         let mut view = Map::new();
         for (key, value) in [
-            ("view", rows(&plan.view)),
+            ("view", pose_json(&plan.view)),
             ("done", json!(plan.done)),
-            ("done_cause", cause(plan.done_cause)),
+            ("done_cause", done_cause_json(plan.done_cause)),
             ("not_worth_it", json!(plan.not_worth_it)),
             ("refusals", json!(refusals)),
             ("message", json!(plan.message)),
@@ -112,10 +127,14 @@ impl Journal {
     }
 
     /// Keeps a registered scan, in place of an earlier version of it.
+    ///
+    /// # Errors
+    /// A message that does not fit, or a folder that cannot be written.
     pub(crate) fn keep(&mut self, message: &RegisteredScan) -> Result<()> {
-        let verdict = verdict(message);
+        let verdict = verdict_json(message);
         let id = message.id;
-        // Scans and views go together unless a motion or a scan failed in between: the number is noted, too.
+        // Scans and views have the same numbers unless a motion or a scan failed in between, so the
+        // scan's number is noted as well.
         match self.views.iter_mut().find(|view| view.get("scan") == Some(&json!(id))) {
             Some(view) => view.insert("verdict".to_owned(), verdict.clone()),
             None => self.views.last_mut().and_then(|view| {
@@ -123,7 +142,7 @@ impl Journal {
                 view.insert("verdict".to_owned(), verdict.clone())
             }),
         };
-        // Without a verdict it is not registered, whoever tries: it has no place among the scans.
+        // A scan without covariance could not be judged: it is kept out of the scan folder.
         let judged = message.object_from_sensor.covariance.iter().any(|v| *v != 0.0);
         if message.cloud.width == 0 || !judged {
             return Ok(());
@@ -135,14 +154,17 @@ impl Journal {
                 scan: scan_from_message(&message.cloud).map_err(anyhow::Error::msg)?,
                 object_from_sensor: prior,
             };
-            scans.put(&view, json!({ "verdict": verdict }))?;
+            scans.write_view(&view, json!({ "verdict": verdict }))?;
             scans.save()?;
         }
         Ok(())
     }
 
-    /// Writes the report; `end` is added to it.
-    pub(crate) fn write(&self, now: Stamp, end: &Map<String, Value>) -> Result<()> {
+    /// Writes the report with `facts` added, at the time `now` of the robot's clock.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(crate) fn write(&self, now: Stamp, facts: &Map<String, Value>) -> Result<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let stages: Map<String, Value> = self
             .stages
@@ -153,14 +175,14 @@ impl Journal {
             "views": self.views,
             "stage_seconds": stages,
             "seconds": self.began.elapsed().as_secs_f64(),
-            "simulated_seconds": now.seconds_since(self.simulated),
+            "simulated_seconds": now.seconds_since(self.began_on_robot),
         });
         if let Some(report) = report.as_object_mut() {
-            report.extend(end.clone());
+            report.extend(facts.clone());
         }
         let path = folder.join("report.json");
         let text = format!("{report:#}\n");
-        // Renamed when it is whole: an interrupted run leaves the one before.
+        // It is renamed when it is complete: an interrupted run leaves the report before it.
         let part = folder.join("report.json.part");
         std::fs::write(&part, text)
             .and_then(|()| std::fs::rename(&part, &path))
@@ -168,19 +190,25 @@ impl Journal {
     }
 }
 
+/// The rows of a pose's matrix; null if it is none.
+fn pose_json(pose: &PoseMessage) -> Value {
+    pose_from_message(pose).map_or(Value::Null, |pose| json!(pose_to_rows(&pose)))
+}
+
 /// The word for why no view is left; null if one is.
-fn cause(code: u8) -> Value {
+fn done_cause_json(code: u8) -> Value {
     let cause = match code {
-        PlanViewResponse::NO_FIRST_VIEW => Cause::NoFirstView,
-        PlanViewResponse::NOTHING_ASKS => Cause::NothingAsks,
-        PlanViewResponse::NOT_WORTH_IT => Cause::NotWorthIt,
-        PlanViewResponse::REFUSED => Cause::Refused,
+        PlanViewResponse::NO_FIRST_VIEW => TerminationCause::NoFirstView,
+        PlanViewResponse::NOTHING_ASKS => TerminationCause::NothingAsks,
+        PlanViewResponse::NOT_WORTH_IT => TerminationCause::NotWorthIt,
+        PlanViewResponse::REFUSED => TerminationCause::Refused,
         _ => return Value::Null,
     };
     cause.to_value()
 }
 
-fn verdict(message: &RegisteredScan) -> Value {
+/// The registrar's verdict on a scan.
+fn verdict_json(message: &RegisteredScan) -> Value {
     let status = status_from_message(message.status).map_or("unknown", |status| status.word());
     let covariance: Vec<&[f64]> = message.object_from_sensor.covariance.chunks(6).collect();
     let free: Vec<&[f64]> = message.free_directions.chunks(6).collect();

@@ -1,32 +1,39 @@
-//! Runs the modelling loop: the only node that knows the order of things.
+//! Runs the modelling loop: the only node that knows in which order the others work.
 //!
-//! The action `model_object` plans a view, moves, scans and waits for the verdict until no view is left, then has all
-//! poses refined, the scans combined and the mesh made. `modelling_status` tells where it stands; `~/pause`,
-//! `~/resume` and the action's cancel steer it. `~/finish` does the last three steps alone. The order itself is
+//! The action `model_object` plans a view, moves, scans and waits for the verdict on the scan until
+//! no view is left; then it has all poses refined, the scans combined and the mesh made. The topic
+//! `modelling_status` has the state of the session; `~/pause`, `~/resume` and cancelling the action
+//! steer it. `~/finish` does the last three steps alone. The order itself is defined in
 //! [`puffer_core::session`].
 
 mod busy;
-mod finish;
+mod finish_service;
 mod goal;
-mod inbox;
 mod journal;
+#[cfg(test)]
+mod journal_tests;
+mod node_clients;
+mod node_services;
 mod params;
-mod partners;
+mod report;
 mod runner;
+#[cfg(test)]
+mod runner_tests;
+mod scan_inbox;
 
-pub use params::{ModellerParams, Noise, Params};
+pub use params::{ModellerParams, Params, SensorChoice};
 
 use anyhow::Result;
 use busy::{Busy, Claim};
 use goal::Modeller;
-use inbox::Inbox;
-use partners::Partners;
+use node_clients::NodeClients;
 use puffer_core::session::Event;
 use puffer_msgs::action::{ModelObject, ModelObjectGoal};
 use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
-use puffer_shell::bulk::{BulkSubscription, Delivery};
-use puffer_shell::{Goal, Node, Profile, RosArgs, Stop};
+use puffer_ros::large_data::{Delivery, LargeDataSubscription};
+use puffer_ros::{Goal, Node, QosProfile, RosArgs, Stop};
+use scan_inbox::ScanInbox;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Runs the modeller until `stop`.
@@ -35,18 +42,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Parameters that do not fit, or no network.
 pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let node: Node<Params> = Node::start("modeller", args, stop.clone()).await?;
-    let scans: BulkSubscription<RegisteredScan> =
-        node.bulk_subscribe("registered_scan", Delivery::Every)?;
+    let scans: LargeDataSubscription<RegisteredScan> =
+        node.large_data_subscribe("registered_scan", Delivery::Every)?;
     let modeller = Arc::new(Modeller {
-        partners: Partners::new(&node)?,
-        inbox: Arc::new(Inbox::default()),
-        status: node.publisher("modelling_status", Profile::Standard)?,
+        clients: NodeClients::new(&node)?,
+        inbox: Arc::new(ScanInbox::default()),
+        status: node.publisher("modelling_status", QosProfile::Standard)?,
         controls: Mutex::new(None),
         busy: Busy::default(),
         node: node.clone(),
     });
     serve_goals(&node, &modeller)?;
-    finish::serve(&node, &modeller)?;
+    finish_service::serve(&node, &modeller)?;
     serve_control(&node, &modeller, "~/pause", Event::Pause)?;
     serve_control(&node, &modeller, "~/resume", Event::Resume)?;
     tracing::info!("ready");
@@ -57,30 +64,28 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
             Some(Err(error)) => tracing::warn!("{error}"),
         }
     }
-    // A running session writes its report before the node goes.
-    while modeller.busy.is_claimed() {
-        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
-    }
+    // A running session writes its report before the node ends.
+    modeller.busy.released().await;
     Ok(())
 }
 
 fn serve_goals(node: &Node<Params>, modeller: &Arc<Modeller>) -> Result<()> {
     let modeller = Arc::clone(modeller);
     let busy = modeller.busy.clone();
-    // From the acceptance of a goal until its work takes it over.
-    let claimed: Arc<Mutex<Option<Claim>>> = Arc::default();
-    let taken = Arc::clone(&claimed);
+    // Holds the claim from the acceptance of a goal until the work on it begins.
+    let accepted: Arc<Mutex<Option<Claim>>> = Arc::default();
+    let begun = Arc::clone(&accepted);
     node.action_server::<ModelObject, _, _, _>(
         "model_object",
         move |goal: &ModelObjectGoal| {
-            goal::check(goal)?;
+            goal::check_goal(goal)?;
             let claim = busy.claim().ok_or("another object is being modelled")?;
-            *claimed.lock().unwrap_or_else(PoisonError::into_inner) = Some(claim);
+            *accepted.lock().unwrap_or_else(PoisonError::into_inner) = Some(claim);
             Ok(())
         },
         move |goal: Goal<ModelObject>| {
             let modeller = Arc::clone(&modeller);
-            let claim = taken.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let claim = begun.lock().unwrap_or_else(PoisonError::into_inner).take();
             async move {
                 let _claim = claim;
                 modeller.model(goal).await

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(modeller::run)
+    puffer_ros::main(modeller::run)
 }

@@ -1,58 +1,58 @@
 //! Parameters of the modeller.
 
-use puffer_core::scans::{SensorKind, Support};
+use puffer_core::scan::{SensorKind, Support};
 use puffer_core::session::SessionParams;
-use puffer_shell::scans::ScanParams;
+use puffer_ros::scans::ScanParams;
 
 puffer_core::choice! {
-    /// The noise family that is noted with the scans.
-    pub enum Noise {
+    /// Kind of the sensor, which decides how its noise is modelled.
+    pub enum SensorChoice {
         /// Not known.
         Unknown = "unknown",
         /// Laser triangulation.
         Laser = "laser",
-        /// Stereo.
+        /// Stereo camera.
         Stereo = "stereo",
     }
 }
 
-impl Noise {
-    /// As a scan folder notes it.
+impl SensorChoice {
+    /// The kind as scan folders have it; `None` if it is not known.
     pub(crate) fn kind(self) -> Option<SensorKind> {
         SensorKind::from_word(match self {
-            Noise::Unknown => "",
-            Noise::Laser => "laser",
-            Noise::Stereo => "stereo",
+            SensorChoice::Unknown => "",
+            SensorChoice::Laser => "laser",
+            SensorChoice::Stereo => "stereo",
         })
     }
 }
 
 puffer_core::params! {
-    /// Where results go, and how long each step may take on the clock on the wall.
+    /// Where results go, and how long each step may take in wall time.
     pub struct ModellerParams("modeller") {
-        /// Folder for scans and report; empty: none are written.
+        /// Folder to which the scans and the report of a run are written; empty: none are written.
         run_folder: String = String::new();
-        /// File of the mesh, as mesh_reconstructor takes it; empty: it chooses.
+        /// File of the mesh within mesh_reconstructor's output folder; empty: mesh.ply.
         mesh_path: String = String::new();
-        /// The noise family that is noted with the scans.
-        sensor: Noise = Noise::Unknown;
-        /// What the object stands on, noted with the scans.
+        /// Kind of the sensor, noted in the scan folder for later processing.
+        sensor: SensorChoice = SensorChoice::Unknown;
+        /// What the object stands on, noted in the scan folder for later processing.
         support: Support = Support::None;
-        /// For the other nodes to be there.
+        /// How long a run waits for the other nodes to appear before it fails.
         start_deadline: f64 = 30.0, in [1.0, 600.0], unit "s";
-        /// For a plan.
+        /// How long planning the next view may take.
         plan_deadline: f64 = 120.0, in [1.0, 3600.0], unit "s";
-        /// For a motion, beyond the time that its trajectory takes.
+        /// How long a motion may take beyond the duration of its trajectory.
         move_deadline: f64 = 60.0, in [1.0, 3600.0], unit "s";
-        /// For a scan.
+        /// How long taking a scan may take.
         scan_deadline: f64 = 120.0, in [1.0, 3600.0], unit "s";
-        /// For the verdict on a scan.
+        /// How long the registration of a scan may take.
         register_deadline: f64 = 120.0, in [1.0, 3600.0], unit "s";
-        /// For the joint optimisation.
+        /// How long the joint optimisation of all poses may take.
         refine_deadline: f64 = 900.0, in [1.0, 36000.0], unit "s";
-        /// For the cloud.
+        /// How long combining all scans to one cloud may take.
         filter_deadline: f64 = 600.0, in [1.0, 36000.0], unit "s";
-        /// For the mesh.
+        /// How long making the mesh may take.
         reconstruct_deadline: f64 = 900.0, in [1.0, 36000.0], unit "s";
     }
 }
@@ -64,7 +64,7 @@ puffer_core::param_groups! {
         session: SessionParams,
         /// Files and deadlines.
         modeller: ModellerParams,
-        /// What is known of the poses, noted with the scans.
+        /// How exact the robot's poses are, noted in the scan folder.
         scan: ScanParams,
     }
 }

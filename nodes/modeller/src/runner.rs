@@ -1,158 +1,171 @@
-//! Carries the session's commands out and tells it what came of them.
+//! Carries out the commands of a session and reports to it how they went.
 
-use crate::Params;
-use crate::inbox::Inbox;
 use crate::journal::Journal;
-use crate::partners::Partners;
+use crate::node_services::NodeServices;
+use crate::report::{End, report_facts};
+use crate::scan_inbox::ScanInbox;
 use anyhow::{Result, anyhow};
-use puffer_core::session::{Command, Event, Outcome, Phase, SessionParams, State, step};
-use puffer_core::verdict::{ModelVerdict, ScanCount};
+use puffer_core::session::{Command, Event, SessionState, step};
 use puffer_msgs::action::{ModelObjectGoal, ReconstructMeshGoal, ReconstructMeshResult};
 use puffer_msgs::msg::RegisteredScan;
 use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::PlanViewRequest;
 use puffer_msgs::trajectory_msgs::msg::JointTrajectory;
-use puffer_shell::convert::status_from_message;
-use puffer_shell::{Node, Stop};
-use serde_json::{Map, Value, json};
+use puffer_ros::Stop;
+use puffer_ros::conversions::status_from_message;
+use serde_json::Map;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc::UnboundedReceiver;
 
 /// One modelling run.
-pub(crate) struct Runner<'a> {
-    pub node: &'a Node<Params>,
-    pub partners: &'a Partners,
-    pub inbox: &'a Inbox,
+pub(crate) struct Runner<'a, S> {
+    services: &'a S,
+    inbox: &'a ScanInbox,
     pub journal: Journal,
-    /// The way to the planned view.
-    trajectory: JointTrajectory,
+    /// Ends the node.
+    node_stop: Stop,
     goal: ModelObjectGoal,
+    /// The motion to the planned view.
+    trajectory: JointTrajectory,
     /// Where the robot was sent to last; no joints if it did not get there.
     sent_to: JointState,
     /// Numbers and versions of the accepted scans.
     accepted: Vec<(u32, u32)>,
+    /// Number of scans whose poses were refined last, and the revision of these poses.
+    refined_scans: usize,
     revision: u32,
-    /// Scans that came before the poses were refined.
-    scans: usize,
     cloud_hash: String,
-    /// What was said of the mesh: of the last one that was written, if there is one.
+    /// Result of the newest mesh that was written; without any, of the newest that was refused.
     pub mesh: ReconstructMeshResult,
 }
 
-/// How a run ended.
-pub(crate) struct End {
-    pub outcome: Outcome,
-    pub state: State,
+/// A session and its operator.
+struct Steering<F> {
+    state: SessionState,
+    /// Pauses, resumes and the wish to end.
+    controls: UnboundedReceiver<Event>,
+    /// Called with each new state, and why a step failed; empty if none did.
+    on_state: F,
 }
 
-impl<'a> Runner<'a> {
+impl<F: FnMut(&SessionState, &str)> Steering<F> {
+    /// The command that follows from `event`.
+    fn advance(&mut self, event: Event) -> Command {
+        let why = match &event {
+            Event::Failed(why) => {
+                tracing::warn!("{why}");
+                why.clone()
+            }
+            _ => String::new(),
+        };
+        self.apply(event, &why).unwrap_or(Command::WaitForResume)
+    }
+
+    fn apply(&mut self, event: Event, why: &str) -> Option<Command> {
+        let (next, command) = step(&self.state, event);
+        self.state = next;
+        (self.on_state)(&self.state, why);
+        command
+    }
+}
+
+impl<'a, S: NodeServices> Runner<'a, S> {
+    /// A run for `goal` that has not begun; `node_stop` ends it.
     pub(crate) fn new(
-        node: &'a Node<Params>,
-        partners: &'a Partners,
-        inbox: &'a Inbox,
+        services: &'a S,
+        inbox: &'a ScanInbox,
         journal: Journal,
         goal: ModelObjectGoal,
-    ) -> Runner<'a> {
+        node_stop: Stop,
+    ) -> Self {
         Runner {
-            node,
-            partners,
+            services,
             inbox,
             journal,
-            trajectory: JointTrajectory::default(),
+            node_stop,
             goal,
+            trajectory: JointTrajectory::default(),
             sent_to: JointState::default(),
             accepted: Vec::new(),
+            refined_scans: 0,
             revision: 0,
-            scans: 0,
             cloud_hash: String::new(),
             mesh: ReconstructMeshResult::default(),
         }
     }
 
-    /// Runs the loop to its end. `controls` brings pauses, resumes and the wish to end; `told` hears each new state.
+    /// Runs the session `state` from the event `first` to its end. `controls` brings pauses,
+    /// resumes and the wish to end. `on_state` is called with each new state and the reason why a
+    /// step failed, which is empty if none did.
     pub(crate) async fn run(
         &mut self,
-        params: SessionParams,
+        state: SessionState,
         first: Event,
-        mut controls: UnboundedReceiver<Event>,
-        mut told: impl FnMut(&State, &str),
+        controls: UnboundedReceiver<Event>,
+        on_state: impl FnMut(&SessionState, &str),
     ) -> End {
-        let mut state = State::new(params);
-        let stop = self.node.stop().child();
-        let (mut command, mut event) = (None, Some(first));
+        let stop = self.node_stop.child();
+        let mut steering = Steering { state, controls, on_state };
+        let mut command = steering.advance(first);
         loop {
-            if let Some(happened) = event.take() {
-                let why = match &happened {
-                    Event::Failed(why) => {
-                        tracing::warn!("{why}");
-                        why.clone()
-                    }
-                    _ => String::new(),
-                };
-                let (next, wanted) = step(&state, happened);
-                state = next;
-                command = wanted.or(command);
-                told(&state, &why);
+            if let Command::End(outcome) = command {
+                stop.stop();
+                return End { outcome, state: steering.state };
             }
-            let doing = match command.take() {
-                Some(Command::End(outcome)) => {
-                    stop.stop();
-                    return End { outcome, state };
-                }
-                Some(doing) => doing,
-                None => Command::Hold,
-            };
-            // The command goes on while controls come in; only the wish to end breaks it off.
-            let work = self.carry_out(&doing, &stop);
-            tokio::pin!(work);
-            event = loop {
-                tokio::select! {
-                    done = &mut work => break Some(done),
-                    control = controls.recv() => {
-                        let control = control.unwrap_or(Event::Cancel);
-                        let (next, wanted) = step(&state, control);
-                        state = next;
-                        told(&state, "");
-                        match wanted {
-                            Some(Command::End(outcome)) => {
-                                stop.stop();
-                                // A robot on its way is told to stop, and heard.
-                                let _ = work.await;
-                                return End { outcome, state };
-                            }
-                            Some(next) => {
-                                command = Some(next);
-                                break None;
-                            }
-                            None => {}
-                        }
-                    }
-                }
-            };
+            command = self.carry_out_steered(&command, &mut steering, &stop).await;
         }
     }
 
-    /// Does what is to be done; what came of it.
+    /// Carries out `command` while controls come in, of which only the wish to end breaks it off;
+    /// the next command.
+    async fn carry_out_steered(
+        &mut self,
+        command: &Command,
+        steering: &mut Steering<impl FnMut(&SessionState, &str)>,
+        stop: &Stop,
+    ) -> Command {
+        let work = self.carry_out(command, stop);
+        tokio::pin!(work);
+        loop {
+            tokio::select! {
+                done = &mut work => return steering.advance(done),
+                control = steering.controls.recv() => {
+                    match steering.apply(control.unwrap_or(Event::Cancel), "") {
+                        Some(end @ Command::End(_)) => {
+                            // A moving robot is told to stop, and its answer awaited.
+                            stop.stop();
+                            let _ = work.await;
+                            return end;
+                        }
+                        Some(next) => return next,
+                        None => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// Carries out `command`; the event that reports how it went.
     async fn carry_out(&mut self, command: &Command, stop: &Stop) -> Event {
-        let (stage, since) = (stage_of(command), Instant::now());
+        let (stage, since) = (stage_name(command), Instant::now());
         let result = match command {
-            Command::Plan { scans, factor } => self.plan(*scans, *factor).await,
-            Command::Move => self.drive(stop).await,
-            Command::Scan => self.partners.trigger().await.map(|()| Event::Scanned),
-            Command::AwaitVerdict { index } => self.verdict(*index).await,
+            Command::Plan { scans, point_factor: factor } => self.plan(*scans, *factor).await,
+            Command::Move => self.move_robot(stop).await,
+            Command::Scan => self.scan().await,
+            Command::AwaitVerdict { index } => self.await_verdict(*index).await,
             Command::Refine { scans } => self.refine(*scans, stop).await,
             Command::Filter { scans } => self.filter(*scans).await,
             Command::Reconstruct => self.reconstruct(stop).await,
-            Command::Hold | Command::End(_) => {
+            Command::WaitForResume | Command::End(_) => {
                 stop.stopped().await;
                 Ok(Event::Cancel)
             }
         };
-        self.journal.took(stage, since.elapsed());
+        self.journal.add_stage_time(stage, since.elapsed());
         self.journal.note(&format!("{stage}_seconds"), since.elapsed().as_secs_f64());
         result.unwrap_or_else(|error| {
             // What the end of the node breaks off has not failed.
-            if self.node.stop().is_stopped() {
+            if self.node_stop.is_stopped() {
                 Event::Cancel
             } else {
                 Event::Failed(format!("{error:#}"))
@@ -172,20 +185,23 @@ impl<'a> Runner<'a> {
             sent_to: self.sent_to.clone(),
             ..PlanViewRequest::default()
         };
-        let plan = self.partners.plan(&request).await?;
-        self.journal.planned(&plan);
-        self.journal.note("planned_at_simulated_seconds", self.node.now().seconds());
+        let deadline = Duration::from_secs_f64(self.services.params().plan_deadline);
+        let plan = self.services.plan_view(&request, deadline).await?;
+        self.journal.begin_view(&plan);
+        self.journal.note("planned_at_simulated_seconds", self.services.now().seconds());
         let coverage = f64::from(plan.coverage);
         if plan.done {
-            return Ok(Event::NothingLeft { coverage, reason: plan.message });
+            return Ok(Event::NoViewLeft { coverage, reason: plan.message });
         }
         self.trajectory = plan.trajectory;
         Ok(Event::Planned { coverage, gain: f64::from(plan.expected_gain) })
     }
 
-    async fn drive(&mut self, stop: &Stop) -> Result<Event> {
+    async fn move_robot(&mut self, stop: &Stop) -> Result<Event> {
         self.sent_to = JointState::default();
-        self.partners.drive(&self.trajectory, stop).await?;
+        let deadline = Duration::from_secs_f64(self.services.params().move_deadline)
+            + duration_of(&self.trajectory);
+        self.services.follow_trajectory(&self.trajectory, deadline, stop).await?;
         if let Some(end) = self.trajectory.points.last() {
             self.sent_to.name = self.trajectory.joint_names.clone();
             self.sent_to.position = end.positions.clone();
@@ -193,18 +209,27 @@ impl<'a> Runner<'a> {
         Ok(Event::Moved)
     }
 
-    async fn verdict(&mut self, index: usize) -> Result<Event> {
-        let deadline = Duration::from_secs_f64(self.node.params().modeller.register_deadline);
-        let first = self.inbox.wait_for(index as u32, deadline).await?;
+    async fn scan(&self) -> Result<Event> {
+        let deadline = Duration::from_secs_f64(self.services.params().scan_deadline);
+        self.services.trigger_scan(deadline).await?;
+        Ok(Event::Scanned)
+    }
+
+    async fn await_verdict(&mut self, index: usize) -> Result<Event> {
+        let first = self.inbox.wait_for(index as u32, self.register_deadline()).await?;
         let status = status_from_message(first.status).map_err(anyhow::Error::msg)?;
         self.accepted = first.accepted.into_iter().zip(first.accepted_versions).collect();
-        self.keep()?;
-        self.journal.write(self.node.now(), &Map::new())?;
+        self.keep_new_scans()?;
+        self.journal.write(self.services.now(), &Map::new())?;
         Ok(Event::Registered(status))
     }
 
-    /// Keeps all scans that came.
-    fn keep(&mut self) -> Result<()> {
+    fn register_deadline(&self) -> Duration {
+        Duration::from_secs_f64(self.services.params().register_deadline)
+    }
+
+    /// Has the journal keep all scans that came since the last call.
+    pub(crate) fn keep_new_scans(&mut self) -> Result<()> {
         for scan in self.inbox.take_new() {
             self.journal.keep(&scan)?;
         }
@@ -212,15 +237,17 @@ impl<'a> Runner<'a> {
     }
 
     async fn refine(&mut self, scans: usize, stop: &Stop) -> Result<Event> {
-        let refined = self.partners.refine(scans, stop).await?;
+        let deadline = Duration::from_secs_f64(self.services.params().refine_deadline);
+        let refined = self.services.refine(scans, deadline, stop).await?;
         self.revision = refined.revision;
-        self.scans = scans;
-        let told: Vec<(u32, u32)> = refined.ids.into_iter().zip(refined.versions).collect();
-        let accepted = |status: &u8| *status == RegisteredScan::ACCEPTED;
-        let verdicts = told.iter().zip(&refined.status);
-        self.accepted = verdicts.filter(|(_, s)| accepted(s)).map(|(scan, _)| *scan).collect();
-        let deadline = Duration::from_secs_f64(self.node.params().modeller.register_deadline);
-        if let Err(error) = self.inbox.wait_for_versions(&told, deadline).await {
+        self.refined_scans = scans;
+        let moved: Vec<(u32, u32)> = refined.ids.into_iter().zip(refined.versions).collect();
+        let verdicts = moved.iter().zip(&refined.status);
+        self.accepted = verdicts
+            .filter(|(_, status)| **status == RegisteredScan::ACCEPTED)
+            .map(|(scan, _)| *scan)
+            .collect();
+        if let Err(error) = self.inbox.wait_for_versions(&moved, self.register_deadline()).await {
             // The mesh does not need them here: the filter has its own.
             tracing::warn!("the run folder holds older points: {error}");
         }
@@ -228,21 +255,28 @@ impl<'a> Runner<'a> {
     }
 
     async fn filter(&mut self, scans: usize) -> Result<Event> {
-        let filtered = self.partners.filter(scans, self.revision).await?;
+        // Scans that came since are not in the revision, but must not be missed by the filter
+        // either.
+        let scans = scans.max(self.inbox.len());
+        let deadline = Duration::from_secs_f64(self.services.params().filter_deadline);
+        let filtered = self.services.filter(scans, self.revision, deadline).await?;
         self.cloud_hash = filtered.cloud_hash;
         Ok(Event::Finished)
     }
 
     async fn reconstruct(&mut self, stop: &Stop) -> Result<Event> {
+        let params = self.services.params();
         let goal = ReconstructMeshGoal {
+            output_path: params.mesh_path,
             cloud_hash: self.cloud_hash.clone(),
             roi: self.goal.roi,
-            scans: self.scans as u32,
+            scans: self.refined_scans as u32,
             accepted: self.accepted.len() as u32,
             force: self.goal.force,
             ..ReconstructMeshGoal::default()
         };
-        let mesh = self.partners.reconstruct(goal, stop).await?;
+        let deadline = Duration::from_secs_f64(params.reconstruct_deadline);
+        let mesh = self.services.reconstruct(goal, deadline, stop).await?;
         if mesh.success || !self.mesh.success {
             self.mesh = mesh.clone();
         }
@@ -255,65 +289,22 @@ impl<'a> Runner<'a> {
         Ok(Event::Reconstructed { sigma: f64::from(mesh.mean_sigma) })
     }
 
-    /// The verdict on the whole of a run that ended.
-    pub(crate) fn verdict_on_all(&self, end: &End) -> ModelVerdict {
-        let mesh = &self.mesh;
-        if mesh.scans == 0 {
-            // It did not come to a mesh: what is known is told.
-            let scans = ScanCount::new(end.state.scans, end.state.accepted);
-            return ModelVerdict { scans, cells_explained: None };
-        }
-        let explained = Some(f64::from(mesh.share_of_cells_explained));
-        ModelVerdict {
-            scans: ScanCount::new(mesh.scans as usize, mesh.accepted as usize),
-            cells_explained: explained.filter(|share| share.is_finite()),
-        }
-    }
-
     /// Writes the report of a run that ended.
-    pub(crate) fn report(&mut self, end: &End) -> Result<()> {
-        self.keep()?;
-        let verdict = self.verdict_on_all(end);
-        let mut facts = verdict.facts();
-        let (outcome, reason) = match &end.outcome {
-            Outcome::Modelled(reason) => ("modelled", reason.clone()),
-            Outcome::Failed(..) if !self.mesh.success && self.mesh.vertices > 0 => {
-                ("not trustworthy", end.state.reason.clone())
-            }
-            Outcome::Failed(phase, reason) => ("failed", format!("{phase:?}: {reason}")),
-            Outcome::Cancelled => ("cancelled", "on request".to_owned()),
-        };
-        for (key, value) in [
-            ("outcome", json!(outcome)),
-            ("reason", json!(reason)),
-            ("scans", json!(verdict.scans.map_or(end.state.scans, |scans| scans.all()))),
-            ("accepted_scans", json!(verdict.scans.map_or(0, |scans| scans.accepted()))),
-            ("coverage", json!(end.state.coverage)),
-            ("mesh", mesh_facts(&self.mesh)),
-        ] {
-            facts.insert(key.to_owned(), value);
-        }
-        self.journal.write(self.node.now(), &facts)
+    pub(crate) fn write_report(&mut self, end: &End) -> Result<()> {
+        self.keep_new_scans()?;
+        self.journal.write(self.services.now(), &report_facts(end, &self.mesh))
     }
 }
 
-fn mesh_facts(mesh: &ReconstructMeshResult) -> Value {
-    if !mesh.success {
-        return Value::Null;
-    }
-    json!({
-        "path": mesh.mesh_path,
-        "vertices": mesh.vertices,
-        "triangles": mesh.triangles,
-        "genus": mesh.genus,
-        "closed": mesh.closed,
-        "mean_sigma": mesh.mean_sigma,
-        "unobserved_share": mesh.unobserved_share,
-        "seconds": mesh.seconds,
-    })
+/// How long a trajectory takes.
+fn duration_of(trajectory: &JointTrajectory) -> Duration {
+    let end = trajectory.points.last().map(|point| point.time_from_start);
+    let seconds = end.map_or(0.0, |end| f64::from(end.sec) + f64::from(end.nanosec) * 1e-9);
+    Duration::from_secs_f64(seconds.max(0.0))
 }
 
-fn stage_of(command: &Command) -> &'static str {
+/// The name of a command's stage in reports.
+fn stage_name(command: &Command) -> &'static str {
     match command {
         Command::Plan { .. } => "plan",
         Command::Move => "move",
@@ -322,23 +313,6 @@ fn stage_of(command: &Command) -> &'static str {
         Command::Refine { .. } => "refine",
         Command::Filter { .. } => "filter",
         Command::Reconstruct => "reconstruct",
-        Command::Hold | Command::End(_) => "hold",
-    }
-}
-
-/// The constant of a phase in `ModelObject.action`.
-pub(crate) fn phase_constant(phase: Phase) -> u8 {
-    use puffer_msgs::action::ModelObjectFeedback as F;
-    match phase {
-        Phase::Preparing => F::PREPARING,
-        Phase::Planning => F::PLANNING,
-        Phase::Moving => F::MOVING,
-        Phase::Scanning => F::SCANNING,
-        Phase::Registering => F::REGISTERING,
-        Phase::Refining => F::REFINING,
-        Phase::Filtering => F::FILTERING,
-        Phase::Reconstructing => F::RECONSTRUCTING,
-        Phase::Done => F::DONE,
-        Phase::Paused => F::PAUSED,
+        Command::WaitForResume | Command::End(_) => "hold",
     }
 }

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use puffer_msgs::action::{ModelObject, ModelObjectGoal, ModelObjectResult};
-use puffer_shell::{NoParams, Node, Outcome, RosArgs, Stop, domain};
+use puffer_ros::{NoParams, Node, Outcome, RosArgs, Stop, domain};
 use std::time::Duration;
 
 /// Long enough for a loaded machine.
@@ -12,7 +12,7 @@ const SOON: Duration = Duration::from_secs(60);
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_goal_without_driver_or_nodes_says_which_and_only_one_is_taken_at_a_time() {
-    let domain = domain::free().unwrap();
+    let domain = domain::find_free().unwrap();
     let stop = Stop::new();
     let words = ["--ros-args", "-p", "modeller.start_deadline:=2.0"].map(str::to_owned);
     let arguments = RosArgs::parse(words).unwrap().with_domain(domain);

@@ -1,34 +1,34 @@
-//! Registered scans and the robot to the next best view.
+//! The view planner as a node: registered scans and the robot to the next best view.
 //!
-//! Takes `registered_scan`, `registered_poses`, `joint_states` and `robot_description`; answers `~/plan_view` with a
-//! view, the way there, and what was considered. Whoever watches gets `~/voxels` and `~/candidates` as markers.
+//! Takes `registered_scan`, `registered_poses`, `joint_states` and `robot_description`; answers
+//! `~/plan_view` with a view, the motion to it, and the candidates that were considered. The space
+//! and the candidates are published as the markers `~/voxels` and `~/candidates`. All planning is
+//! done by [`Planner`].
 
-mod answer;
-mod desk;
+mod inputs;
 mod markers;
 mod params;
+mod response;
 
-pub use params::{Params, PlannerParams, SensorChoice};
+pub use params::Params;
 
 use anyhow::Result;
-use desk::Desk;
 use markers::Markers;
+use puffer_core::geometry::Aabb;
+use puffer_core::planner::{JointPositions, PlanRequest, Planner, Readiness};
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::sensor_msgs::msg::JointState;
 use puffer_msgs::srv::{PlanView, PlanViewRequest, PlanViewResponse};
-use puffer_msgs::std_msgs::msg::String as Text;
+use puffer_msgs::std_msgs::msg::{Header, String as Text};
 use puffer_msgs::std_srvs::srv::{Trigger, TriggerResponse};
-use puffer_shell::bulk::{BulkSubscription, Delivery};
-use puffer_shell::{Node, Profile, RosArgs, Stop, Subscription};
+use puffer_ros::large_data::{Delivery, LargeDataSubscription};
+use puffer_ros::{Node, QosProfile, RosArgs, Shared, Stop, Subscription};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tokio::sync::Mutex;
 
-/// How often it is looked whether all is there that a plan needs.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// How long a plan waits for joint states that say that the robot stands where it was sent to: they follow the end of a
-/// motion within a period of the controller.
-const REST_DEADLINE: Duration = Duration::from_secs(2);
+/// How long a plan waits for joint states that say that the robot is where it was sent to: they
+/// follow the end of a motion within a period of the controller.
+const MAX_REST_WAIT: Duration = Duration::from_secs(2);
 
 /// Runs the planner until `stop`.
 ///
@@ -36,36 +36,41 @@ const REST_DEADLINE: Duration = Duration::from_secs(2);
 /// Parameters that do not fit, or no network.
 pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     let node: Node<Params> = Node::start("nbv_planner", args, stop.clone()).await?;
-    let scans: BulkSubscription<RegisteredScan> =
-        node.bulk_subscribe("registered_scan", Delivery::Every)?;
-    let poses: BulkSubscription<RegisteredPoses> =
-        node.bulk_subscribe("registered_poses", Delivery::Newest)?;
-    let mut joints: Subscription<JointState> = node.subscribe("joint_states", Profile::Standard)?;
+    let scans: LargeDataSubscription<RegisteredScan> =
+        node.large_data_subscribe("registered_scan", Delivery::Every)?;
+    let poses: LargeDataSubscription<RegisteredPoses> =
+        node.large_data_subscribe("registered_poses", Delivery::Newest)?;
+    let mut joints: Subscription<JointState> =
+        node.subscribe("joint_states", QosProfile::Standard)?;
     let mut descriptions: Subscription<Text> =
-        node.subscribe("robot_description", Profile::LatchedSub)?;
-    let desk = Arc::new(Mutex::new(Desk::new(node.params())?));
+        node.subscribe("robot_description", QosProfile::LatchedSub)?;
+    let Params { planner: params, view } = node.params();
+    let region = params.region();
+    let planner = Shared::new(Planner::new(params, view)?);
     let markers = Arc::new(Markers::new(&node)?);
-    serve_plans(&node, &desk, &markers)?;
-    serve_reset(&node, &desk)?;
+    serve_plans(&node, &planner, &markers, region)?;
+    serve_reset(&node, &planner)?;
     tracing::info!("ready");
     loop {
         let next = async {
             tokio::select! {
                 scan = scans.next() => {
                     let scan = scan?;
-                    let mut desk = desk.lock().await;
-                    tokio::task::block_in_place(|| desk.take(&scan))?;
-                    markers.show_space(desk.space(), desk.header(node.now()));
+                    let mut planner = planner.lock().await;
+                    tokio::task::block_in_place(|| take_scan(&mut planner, &scan))?;
+                    markers.show_space(planner.space(), header(&node, &planner));
                     Ok(())
                 }
-                poses = poses.next() => desk.lock().await.correct(&poses?),
+                poses = poses.next() => take_poses(&mut *planner.lock().await, &poses?),
                 Some(state) = joints.next() => {
-                    desk.lock().await.stand(&state);
+                    planner.lock().await.on_joint_state(&inputs::joint_positions(&state));
                     Ok(())
                 }
                 Some(text) = descriptions.next() => {
-                    let mut desk = desk.lock().await;
-                    tokio::task::block_in_place(|| desk.describe(&text.data))
+                    let mut planner = planner.lock().await;
+                    let taken =
+                        tokio::task::block_in_place(|| planner.on_robot_description(&text.data));
+                    Ok(taken?)
                 }
             }
         };
@@ -77,95 +82,128 @@ pub async fn run(args: RosArgs, stop: Stop) -> Result<()> {
     }
 }
 
-fn serve_plans(node: &Node<Params>, desk: &Arc<Mutex<Desk>>, markers: &Arc<Markers>) -> Result<()> {
-    let (shared, desk, markers) = (node.clone(), Arc::clone(desk), Arc::clone(markers));
+/// Gives the planner a scan.
+fn take_scan(planner: &mut Planner, message: &RegisteredScan) -> Result<()> {
+    Ok(planner.on_scan(inputs::scan_update(message)?)?)
+}
+
+/// Gives the planner corrected poses.
+fn take_poses(planner: &mut Planner, message: &RegisteredPoses) -> Result<()> {
+    planner.on_corrected_poses(message.revision, &inputs::pose_updates(message)?);
+    Ok(())
+}
+
+/// The header of what is published of the space, now: its frame is that of the scans.
+fn header(node: &Node<Params>, planner: &Planner) -> Header {
+    Header { stamp: node.now().into(), frame_id: planner.frame().to_owned() }
+}
+
+/// Serves `~/plan_view`; `configured` is the region of interest where a request names none.
+fn serve_plans(
+    node: &Node<Params>,
+    planner: &Shared<Planner>,
+    markers: &Arc<Markers>,
+    configured: Aabb,
+) -> Result<()> {
+    let (shared, planner, markers) = (node.clone(), planner.clone(), Arc::clone(markers));
     node.serve::<PlanView, _, _>("~/plan_view", move |request: PlanViewRequest| {
-        let (node, desk, markers) = (shared.clone(), Arc::clone(&desk), Arc::clone(&markers));
+        let (node, planner, markers) = (shared.clone(), planner.clone(), Arc::clone(&markers));
         async move {
+            let request = match inputs::plan_request(&request, &configured) {
+                Ok(request) => request,
+                Err(error) => return failed(PlanViewResponse::FAILED, format!("{error:#}")),
+            };
             let deadline = Duration::from_secs_f64(node.params().planner.input_deadline);
-            if let Err(response) = wait_for(&desk, &request, deadline).await {
+            if let Err(response) = wait_for_inputs(&planner, &request, deadline).await {
                 return *response;
             }
-            wait_for_rest(&desk, &request.sent_to).await;
-            let mut desk = desk.lock().await;
-            let since = Instant::now();
-            match tokio::task::block_in_place(|| desk.plan(&request)) {
-                Ok(planned) => {
-                    markers.show_space(desk.space(), desk.header(node.now()));
-                    markers.show_plan(&planned.plan, &desk.header(node.now()));
-                    let response = answer::response(&planned, &desk.joint_names());
-                    tracing::info!(
-                        "{} in {:.2} s: gain {:.0}, coverage {:.1} %{}",
-                        response.message,
-                        since.elapsed().as_secs_f64(),
-                        response.expected_gain,
-                        response.coverage * 100.0,
-                        if response.done { ", done" } else { "" }
-                    );
-                    node.diagnostics().set("coverage", response.coverage);
-                    response
-                }
-                Err(error) => failed(PlanViewResponse::FAILED, format!("{error:#}")),
+            if let Some(goal) = &request.sent_to {
+                wait_for_rest(&planner, goal).await;
             }
+            plan(&node, &mut *planner.lock().await, &markers, &request)
         }
     })
 }
 
-/// Waits until all is there that a plan needs.
-async fn wait_for(
-    desk: &Mutex<Desk>,
-    request: &PlanViewRequest,
+/// Answers a request whose inputs have arrived.
+fn plan(
+    node: &Node<Params>,
+    planner: &mut Planner,
+    markers: &Markers,
+    request: &PlanRequest,
+) -> PlanViewResponse {
+    let since = Instant::now();
+    let result = match tokio::task::block_in_place(|| planner.plan(request)) {
+        Ok(result) => result,
+        Err(error) => return failed(PlanViewResponse::FAILED, format!("{error:#}")),
+    };
+    markers.show_space(planner.space(), header(node, planner));
+    markers.show_plan(&result.plan, &header(node, planner));
+    let response = response::from_result(&result, &planner.joint_names());
+    tracing::info!(
+        "{} in {:.2} s: gain {:.0}, coverage {:.1} %{}",
+        response.message,
+        since.elapsed().as_secs_f64(),
+        response.expected_gain,
+        response.coverage * 100.0,
+        if response.done { ", done" } else { "" }
+    );
+    node.diagnostics().set("coverage", response.coverage);
+    response
+}
+
+/// Waits until the inputs of a request have arrived.
+async fn wait_for_inputs(
+    planner: &Shared<Planner>,
+    request: &PlanRequest,
     deadline: Duration,
 ) -> std::result::Result<(), Box<PlanViewResponse>> {
-    let since = Instant::now();
-    loop {
-        let (fault, no_robot, no_scans) = {
-            let desk = desk.lock().await;
-            (desk.fault(), desk.missing_robot(), desk.missing_scans(request))
-        };
-        if let Some(fault) = fault {
-            return Err(Box::new(failed(PlanViewResponse::NO_ROBOT, fault)));
-        }
-        let (code, missing) = match (no_robot, no_scans) {
-            (None, None) => return Ok(()),
-            (_, Some(missing)) => (PlanViewResponse::SCANS_MISSING, missing),
-            (Some(missing), None) => (PlanViewResponse::NO_ROBOT, missing),
-        };
-        if since.elapsed() > deadline {
+    let waited = planner.wait_until(deadline, |planner| match planner.readiness(request) {
+        Readiness::Ready => Ok(None),
+        // No wait mends that.
+        Readiness::RobotUnusable(error) => Ok(Some(error)),
+        Readiness::ScansMissing(missing) => Err((PlanViewResponse::SCANS_MISSING, missing)),
+        Readiness::RobotMissing(missing) => Err((PlanViewResponse::NO_ROBOT, missing)),
+    });
+    match waited.await {
+        Ok(None) => Ok(()),
+        Ok(Some(error)) => Err(Box::new(failed(PlanViewResponse::NO_ROBOT, error))),
+        Err((code, missing)) => {
             let text = format!("{missing} within {:.0} s", deadline.as_secs_f64());
-            return Err(Box::new(failed(code, text)));
+            Err(Box::new(failed(code, text)))
         }
-        tokio::time::sleep(LOOK_EVERY).await;
     }
 }
 
-/// Waits a little for joint states that say that the robot stands where it was sent to.
-async fn wait_for_rest(desk: &Mutex<Desk>, sent_to: &JointState) {
-    let since = Instant::now();
-    while !sent_to.name.is_empty() && !desk.lock().await.stands_at(sent_to) {
-        if since.elapsed() > REST_DEADLINE {
-            tracing::warn!(
-                "the robot does not stand where it was sent to: the way starts from joint_states"
-            );
-            return;
+/// Waits a little for joint states that say that the robot is at `goal`.
+async fn wait_for_rest(planner: &Shared<Planner>, goal: &JointPositions) {
+    let at_rest = planner.wait_until(MAX_REST_WAIT, |planner| {
+        if planner.is_at(goal) {
+            Ok(())
+        } else {
+            Err("the robot does not stand where it was sent to")
         }
-        tokio::time::sleep(LOOK_EVERY).await;
+    });
+    if let Err(missing) = at_rest.await {
+        tracing::warn!("{missing}: the way starts from joint_states");
     }
 }
 
+/// The response to a request that cannot be answered; it is logged as an error.
 fn failed(error_code: u16, message: String) -> PlanViewResponse {
     tracing::error!("no plan: {message}");
     PlanViewResponse { success: false, error_code, message, ..PlanViewResponse::default() }
 }
 
-fn serve_reset(node: &Node<Params>, desk: &Arc<Mutex<Desk>>) -> Result<()> {
-    let desk = Arc::clone(desk);
+/// Serves `~/reset`, which forgets all scans.
+fn serve_reset(node: &Node<Params>, planner: &Shared<Planner>) -> Result<()> {
+    let planner = planner.clone();
     node.serve::<Trigger, _, _>("~/reset", move |_| {
-        let desk = Arc::clone(&desk);
+        let planner = planner.clone();
         async move {
-            let mut desk = desk.lock().await;
-            let message = format!("{} scans forgotten", desk.scans());
-            match tokio::task::block_in_place(|| desk.reset()) {
+            let mut planner = planner.lock().await;
+            let message = format!("{} scans forgotten", planner.scan_count());
+            match tokio::task::block_in_place(|| planner.reset()) {
                 Ok(()) => TriggerResponse { success: true, message },
                 Err(error) => TriggerResponse { success: false, message: format!("{error:#}") },
             }

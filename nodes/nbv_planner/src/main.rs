@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(nbv_planner::run)
+    puffer_ros::main(nbv_planner::run)
 }

@@ -1,16 +1,18 @@
-//! The command line of puffer. Each command is one file in [`commands`]; this one parses and reports.
+//! The command line of puffer. Each command is one file in [`commands`]; this one parses and
+//! reports.
 
 pub mod commands;
-mod failure;
-mod fleet;
+pub mod exit_status;
+mod launcher;
+mod modelling_run;
 mod nodes;
-mod parameters;
-mod picture;
+mod notes;
+pub mod parameters;
+mod png_file;
 mod progress;
-mod run;
 mod setups;
-mod table;
-mod verdict;
+pub mod table;
+mod verdict_report;
 
 use clap::Parser;
 use commands::Command;
@@ -28,32 +30,50 @@ struct Cli {
     threads: Option<usize>,
 }
 
-/// Runs the program with `args`, of which the first is its own name.
-///
-/// Exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted; on failure one message on standard error.
+/// Runs the program `puffer` with `args`, of which the first is its own name. See [`run_program`].
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(args) {
+    run_program(args, |cli: Cli| {
+        set_threads(cli.threads)?;
+        cli.command.run()
+    })
+}
+
+/// Parses `args`, of which the first is the program's own name, and hands them to `execute`.
+///
+/// Exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted; on failure one message on
+/// standard error.
+pub fn run_program<C: Parser>(
+    args: impl IntoIterator<Item = OsString>,
+    execute: impl FnOnce(C) -> anyhow::Result<ExitCode>,
+) -> ExitCode {
+    let cli = match C::try_parse_from(args) {
         Ok(cli) => cli,
         Err(error) => {
-            let status = if error.use_stderr() { failure::USAGE } else { 0 };
-            // Nobody is left to tell if the terminal is gone.
+            let status = if error.use_stderr() { exit_status::USAGE_STATUS } else { 0 };
+            // There is nowhere to report that the terminal is gone.
             let _ = error.print();
             return ExitCode::from(status);
         }
     };
-    match set_threads(cli.threads).and_then(|()| cli.command.run()) {
+    match execute(cli) {
         Ok(status) => status,
         Err(error) => {
-            eprintln!("puffer: {error:#}");
-            ExitCode::from(failure::status(&error))
+            eprintln!("{}: {error:#}", C::command().get_name());
+            ExitCode::from(exit_status::exit_status(&error))
         }
     }
 }
 
-fn set_threads(threads: Option<usize>) -> anyhow::Result<()> {
+/// Makes computations use this number of threads; `None`: one for each core.
+///
+/// # Errors
+/// Wrong usage if the number is not between 1 and 1024.
+pub fn set_threads(threads: Option<usize>) -> anyhow::Result<()> {
     let Some(threads) = threads else { return Ok(()) };
     if !(1..=1024).contains(&threads) {
-        return Err(failure::usage(format!("--threads {threads}: allowed are 1 to 1024")));
+        return Err(exit_status::usage_error(format!(
+            "--threads {threads}: allowed are 1 to 1024"
+        )));
     }
     Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?)
 }

@@ -1,16 +1,16 @@
-//! The nodes that this program can be.
+//! The nodes that this program can run as.
 
 use anyhow::Result;
 use puffer_core::params::{ParamSpec, Parameters};
-use puffer_shell::{RosArgs, Stop};
+use puffer_ros::{RosArgs, Stop};
 use std::pin::Pin;
 
-type Running = Pin<Box<dyn Future<Output = Result<()>> + Send>>;
+type NodeFuture = Pin<Box<dyn Future<Output = Result<()>> + Send>>;
 
 /// A node: its name, its `run` and its parameters.
 pub(crate) struct NodeKind {
     pub name: &'static str,
-    pub run: fn(RosArgs, Stop) -> Running,
+    pub run: fn(RosArgs, Stop) -> NodeFuture,
     pub specs: fn() -> Vec<ParamSpec>,
     /// Checks one parameter.
     pub check: fn(&str, &str, &serde_json::Value) -> puffer_core::Result<()>,
@@ -34,6 +34,6 @@ pub(crate) static NODES: [NodeKind; 6] =
     kinds![mesh_reconstructor, cloud_filter, nbv_planner, scan_registrar, modeller, mock_driver];
 
 /// The node of that name.
-pub(crate) fn find(name: &str) -> Option<&'static NodeKind> {
+pub(crate) fn find_node(name: &str) -> Option<&'static NodeKind> {
     NODES.iter().find(|kind| kind.name == name)
 }

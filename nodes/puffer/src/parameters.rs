@@ -1,10 +1,10 @@
 //! Parameters from a YAML file and from the command line.
 
-use crate::failure::usage;
+use crate::exit_status::usage_error;
 use anyhow::{Context, Result};
 use clap::Args;
 use puffer_core::params::Parameters;
-use puffer_core::pipeline::Params;
+use puffer_core::pipeline::PipelineParams;
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -21,17 +21,18 @@ pub struct ParameterArgs {
 
 impl ParameterArgs {
     /// Defaults, overridden by the file, overridden by the settings.
-    pub(crate) fn load(&self) -> Result<Params> {
-        self.load_onto(Params::default())
+    pub fn load(&self) -> Result<PipelineParams> {
+        self.load_onto(PipelineParams::default())
     }
 
     /// `params`, overridden by the file, overridden by the settings.
-    pub(crate) fn load_onto<P: Parameters>(&self, mut params: P) -> Result<P> {
+    pub fn load_onto<P: Parameters>(&self, mut params: P) -> Result<P> {
         if let Some(path) = &self.params {
             let text = std::fs::read_to_string(path)
                 .with_context(|| format!("cannot read the parameter file {}", path.display()))?;
-            let document: Value = serde_yaml_ng::from_str(&text)
-                .map_err(|error| usage(format!("{}: not valid YAML: {error}", path.display())))?;
+            let document: Value = serde_yaml_ng::from_str(&text).map_err(|error| {
+                usage_error(format!("{}: not valid YAML: {error}", path.display()))
+            })?;
             if !document.is_null() {
                 params.set_all(&document).with_context(|| path.display().to_string())?;
             }
@@ -41,7 +42,7 @@ impl ParameterArgs {
                 .split_once('=')
                 .and_then(|(name, value)| Some((name.split_once('.')?, value)));
             let ((group, field), value) = parsed.ok_or_else(|| {
-                usage(format!(
+                usage_error(format!(
                     "--set {setting}: expected NAME=VALUE, such as filter.noise_radius=0.002"
                 ))
             })?;

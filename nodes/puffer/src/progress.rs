@@ -1,5 +1,5 @@
-//! Progress on the terminal: a bar where there is one, plain lines elsewhere. Also takes the time of each stage and
-//! turns Ctrl-C into a cancellation.
+//! Progress on the terminal: a bar where there is one, plain lines elsewhere. Also takes the time
+//! of each stage and turns Ctrl-C into a cancellation.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use puffer_core::Progress;
@@ -8,42 +8,45 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Steps of the bar: a tenth of a per cent each.
-const STEPS: f64 = 1000.0;
+const BAR_STEPS: f64 = 1000.0;
 
 /// Watches a long operation.
-pub(crate) struct Watch {
-    state: Arc<Mutex<State>>,
+pub(crate) struct TerminalProgress {
+    state: Arc<Mutex<StageTimes>>,
     progress: Progress,
 }
 
-struct State {
+struct StageTimes {
     stage: String,
     since: Instant,
     times: Vec<(String, Duration)>,
     bar: Option<ProgressBar>,
 }
 
-impl Watch {
+impl TerminalProgress {
     /// Starts watching; stops the operation on Ctrl-C.
-    pub(crate) fn start() -> Watch {
+    pub(crate) fn start() -> TerminalProgress {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(STEPS as u64);
+            let bar = ProgressBar::new(BAR_STEPS as u64);
             let style =
                 ProgressStyle::with_template("{msg:>12} [{bar:40}] {percent:>3} %  {elapsed}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        let state = State { stage: String::new(), since: Instant::now(), times: Vec::new(), bar };
+        let state =
+            StageTimes { stage: String::new(), since: Instant::now(), times: Vec::new(), bar };
         let state = Arc::new(Mutex::new(state));
         let shared = Arc::clone(&state);
-        let progress = Progress::to(move |stage, fraction| lock(&shared).update(stage, fraction));
+        let progress =
+            Progress::with_listener(move |stage, fraction| lock(&shared).update(stage, fraction));
         let cancelled = progress.clone();
-        // A second watch in one process (tests) keeps the first one's handler: Ctrl-C still ends the process.
+        // A second watch in one process (tests) keeps the first one's handler: Ctrl-C still ends
+        // the process.
         let _ = ctrlc::set_handler(move || {
             eprintln!("puffer: interrupted, stopping");
             cancelled.cancel();
         });
-        Watch { state, progress }
+        TerminalProgress { state, progress }
     }
 
     /// What the operation reports to.
@@ -62,7 +65,7 @@ impl Watch {
     }
 }
 
-impl State {
+impl StageTimes {
     fn update(&mut self, stage: &str, fraction: f64) {
         if stage != self.stage {
             self.end_stage();
@@ -74,7 +77,7 @@ impl State {
             }
         }
         if let Some(bar) = &self.bar {
-            bar.set_position((fraction * STEPS) as u64);
+            bar.set_position((fraction * BAR_STEPS) as u64);
         }
     }
 
@@ -93,7 +96,7 @@ impl State {
     }
 }
 
-fn lock(state: &Mutex<State>) -> std::sync::MutexGuard<'_, State> {
+fn lock(state: &Mutex<StageTimes>) -> std::sync::MutexGuard<'_, StageTimes> {
     // A panic elsewhere does not make the times wrong.
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }

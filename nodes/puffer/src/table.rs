@@ -5,14 +5,14 @@ use std::io::Write;
 
 /// A list of results that prints as a table or as one JSON object.
 #[derive(Default)]
-pub(crate) struct Report {
+pub struct ResultTable {
     rows: Vec<(String, String)>,
     json: Map<String, Value>,
 }
 
-impl Report {
+impl ResultTable {
     /// Adds a line to the table and `key` to the JSON object.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         label: &str,
         text: impl Into<String>,
@@ -24,12 +24,12 @@ impl Report {
     }
 
     /// Adds to the JSON object only.
-    pub(crate) fn add_value(&mut self, key: &str, value: impl Into<Value>) {
+    pub fn add_value(&mut self, key: &str, value: impl Into<Value>) {
         self.json.insert(key.to_owned(), value.into());
     }
 
     /// Prints to standard output.
-    pub(crate) fn print(self, json: bool) {
+    pub fn print(self, json: bool) {
         if json {
             print_text(&format!("{}\n", Value::Object(self.json)));
             return;
@@ -39,14 +39,19 @@ impl Report {
 }
 
 /// Prints labels and texts in two columns.
-pub(crate) fn print_rows(rows: &[(String, String)]) {
+pub fn print_rows(rows: &[(String, String)]) {
     let width = rows.iter().map(|(label, _)| label.chars().count()).max().unwrap_or(0);
-    let line = |(label, text): &(String, String)| format!("{label:<width$}  {text}\n");
-    print_text(&rows.iter().map(line).collect::<String>());
+    let lines = rows.iter().map(|(label, text)| format!("{label:<width$}  {text}\n"));
+    print_text(&lines.collect::<String>());
+}
+
+/// A property of a mesh that should hold, in words: the fault stands out.
+pub(crate) fn yes_or_no(holds: bool) -> &'static str {
+    if holds { "yes" } else { "NO" }
 }
 
 /// Prints to standard output. A reader that has seen enough, as `head` has, is no fault.
-pub(crate) fn print_text(text: &str) {
+pub fn print_text(text: &str) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         if error.kind() == std::io::ErrorKind::BrokenPipe {

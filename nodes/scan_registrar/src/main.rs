@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    puffer_shell::main(scan_registrar::run)
+    puffer_ros::main(scan_registrar::run)
 }

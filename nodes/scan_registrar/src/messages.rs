@@ -1,32 +1,31 @@
-//! What the registrar says of its scans.
+//! The messages that the registrar publishes.
 
 use puffer_core::geometry::Mat6;
+use puffer_core::intake::Intake;
 use puffer_core::register::Registration;
-use puffer_msgs::builtin_interfaces::msg::Time;
 use puffer_msgs::msg::{RegisteredPoses, RegisteredScan};
 use puffer_msgs::std_msgs::msg::Header;
-use puffer_shell::Stamp;
-use puffer_shell::convert::{pose_message, pose_with_covariance, scan_message, status_message};
-use puffer_shell::scans::Intake;
+use puffer_ros::Stamp;
+use puffer_ros::conversions::{pose_message, pose_with_covariance, scan_message, status_message};
 
 fn header(stamp: Stamp, frame: &str) -> Header {
-    let (sec, nanosec) = stamp.parts();
-    Header { stamp: Time { sec, nanosec }, frame_id: frame.to_owned() }
+    Header { stamp: stamp.into(), frame_id: frame.to_owned() }
 }
 
-/// Scan `id` as it stands, in the frame `object`.
-pub(crate) fn scan(id: usize, intake: &Intake, object: &str) -> RegisteredScan {
-    let scan = intake.scan(id);
+/// Scan `id` with its newest pose and verdict, in the frame `object`.
+pub(crate) fn registered_scan_message(id: usize, intake: &Intake, object: &str) -> RegisteredScan {
+    let scan = intake.state(id);
     let (accepted, accepted_versions) = intake.accepted();
+    let stamp = Stamp::from_nanos(scan.label.nanoseconds);
     let verdict = scan.verdict;
     let covariance = verdict.map_or_else(Mat6::zeros, |v| v.covariance);
     let free = verdict.map_or(&[][..], |v| &v.free_directions);
     RegisteredScan {
-        header: header(scan.stamp, object),
+        header: header(stamp, object),
         id: id as u32,
         version: scan.version,
-        cloud: scan_message(scan.scan, header(scan.stamp, scan.frame)),
-        beyond: scan_message(scan.beyond, header(scan.stamp, scan.frame)),
+        cloud: scan_message(scan.object, header(stamp, &scan.label.frame)),
+        beyond: scan_message(scan.beyond, header(stamp, &scan.label.frame)),
         object_from_sensor: pose_with_covariance(&scan.pose, &covariance),
         prior: pose_message(&scan.prior),
         status: status_message(scan.status()),
@@ -41,8 +40,8 @@ pub(crate) fn scan(id: usize, intake: &Intake, object: &str) -> RegisteredScan {
     }
 }
 
-/// The poses of all usable scans after a refinement.
-pub(crate) fn poses(
+/// The poses of all usable scans after a refinement, in the frame `object`.
+pub(crate) fn registered_poses_message(
     intake: &Intake,
     registration: &Registration,
     revision: u32,
@@ -53,8 +52,8 @@ pub(crate) fn poses(
     RegisteredPoses {
         header: header(stamp, object),
         revision,
-        ids: intake.usable().iter().map(|&id| id as u32).collect(),
-        versions: intake.usable().iter().map(|&id| intake.scan(id).version).collect(),
+        ids: intake.usable_ids().iter().map(|&id| id as u32).collect(),
+        versions: intake.usable_ids().iter().map(|&id| intake.state(id).version).collect(),
         status: verdicts.iter().map(|v| status_message(v.status)).collect(),
         object_from_sensor: registration
             .poses
@@ -62,20 +61,22 @@ pub(crate) fn poses(
             .zip(verdicts)
             .map(|(pose, verdict)| pose_with_covariance(pose, &verdict.covariance))
             .collect(),
-        residual: registration.residual,
+        residual: registration.residual.unwrap_or(f64::NAN),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use puffer_shell::scans::RegistrarParams;
+    use puffer_core::intake::ScanLabel;
+    use puffer_ros::scans::RegistrarParams;
 
     #[test]
     fn a_scan_bears_the_frame_of_the_driver_and_the_object_s_as_it_is_configured() {
-        let mut intake = Intake::new(RegistrarParams::default());
-        let id = intake.add_unusable(Stamp::new(7, 8), "zivid_optical", "no transform".to_owned());
-        let message = scan(id, &intake, "workpiece");
+        let mut intake = Intake::new(RegistrarParams::default().intake());
+        let label = ScanLabel { nanoseconds: 7_000_000_008, frame: "zivid_optical".to_owned() };
+        let id = intake.add_unusable(label, "no transform".to_owned());
+        let message = registered_scan_message(id, &intake, "workpiece");
         assert_eq!(message.header.frame_id, "workpiece");
         assert_eq!(message.cloud.header.frame_id, "zivid_optical");
         assert_eq!(message.beyond.header.frame_id, "zivid_optical");

@@ -57,8 +57,9 @@ fn ply_keeps_the_mesh_with_its_attributes() {
     assert_eq!(read.triangles, mesh.triangles);
     assert_eq!(read.observed, mesh.observed);
     assert!(close(&read.normals, &mesh.normals, 1e-7));
-    let bits = |sigma: &[f64]| sigma.iter().map(|s| s.to_bits()).collect::<Vec<_>>();
-    assert_eq!(bits(&read.sigma), bits(&mesh.sigma));
+    let [read_bits, bits] =
+        [&read, &mesh].map(|m| m.sigma.iter().map(|s| s.to_bits()).collect::<Vec<_>>());
+    assert_eq!(read_bits, bits);
 }
 
 #[test]
@@ -135,13 +136,16 @@ fn glb_keeps_vertices_normals_and_triangles() {
     assert!(close(&read.normals, &mesh.normals, 1e-7));
 }
 
+fn word(bytes: &[u8], at: usize) -> usize {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize
+}
+
 #[test]
 fn glb_is_aligned_bounded_and_y_up() {
     let bytes = bytes_of("mesh.glb");
-    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-    assert_eq!((word(4), word(8)), (2, bytes.len()));
-    let json_length = word(12);
-    assert!(json_length % 4 == 0 && word(20 + json_length) % 4 == 0);
+    assert_eq!((word(&bytes, 4), word(&bytes, 8)), (2, bytes.len()));
+    let json_length = word(&bytes, 12);
+    assert!(json_length.is_multiple_of(4) && word(&bytes, 20 + json_length).is_multiple_of(4));
     let json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + json_length]).unwrap();
     for view in json["bufferViews"].as_array().unwrap() {
         assert_eq!(view["byteOffset"].as_u64().unwrap() % 4, 0);
@@ -192,28 +196,41 @@ fn the_content_tells_the_format_where_the_extension_does_not() {
 #[test]
 fn inconsistent_meshes_and_unknown_extensions_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
-    let says = |name: &str, mesh: &Mesh, text: &str| {
-        let error = write_mesh(&folder.path().join(name), mesh, &[]).unwrap_err().to_string();
-        assert!(error.contains(text), "{error}");
-    };
-    says("mesh.xyz", &octahedron(), ".ply, .stl, .obj or .glb");
-    says("mesh.ply", &Mesh { sigma: vec![0.0], ..octahedron() }, "6 vertices but 1 sigma");
-    says("mesh.ply", &Mesh { triangles: vec![[0, 1, 6]], ..octahedron() }, "names vertex 6");
-    says("mesh.ply", &Mesh::default(), "no triangle");
+    for (name, mesh, says) in [
+        ("mesh.xyz", octahedron(), ".ply, .stl, .obj or .glb"),
+        ("mesh.ply", Mesh { sigma: vec![0.0], ..octahedron() }, "6 vertices but 1 sigma"),
+        ("mesh.ply", Mesh { triangles: vec![[0, 1, 6]], ..octahedron() }, "names vertex 6"),
+        ("mesh.ply", Mesh::default(), "no triangle"),
+    ] {
+        let error = write_mesh(&folder.path().join(name), &mesh, &[]).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+fn one_vertex_ply(rest: &str) -> String {
+    format!("ply\nformat ascii 1.0\nelement vertex 1\n{rest}")
 }
 
 #[test]
 fn mesh_files_that_make_no_mesh_say_why() {
-    let ply = |rest: &str| format!("ply\nformat ascii 1.0\nelement vertex 1\n{rest}");
     let xyz = "property float x\nproperty float y\nproperty float z\n";
     let face = "element face 1\nproperty list uchar int vertex_index\nend_header\n";
     for (text, says) in [
-        (ply(&format!("{xyz}end_header\n0 0 0\n")), "has no element 'face' (only: vertex)"),
-        (ply(&format!("property float x\n{face}0\n3 0 0 0\n")), "need the properties x, y and z"),
-        (ply(&format!("{xyz}{face}0 0 0\n3 0 0 1\n")), "face 0 names vertex 1, but there are 1"),
-        (ply(&format!("{xyz}{face}0 0 0\n2 0 0\n")), "has no face"),
-        (ply(&format!("{xyz}{face}0 nan 0\n3 0 0 0\n")), "vertex 0 are not finite"),
+        (
+            one_vertex_ply(&format!("{xyz}end_header\n0 0 0\n")),
+            "has no element 'face' (only: vertex)",
+        ),
+        (
+            one_vertex_ply(&format!("property float x\n{face}0\n3 0 0 0\n")),
+            "need the properties x, y and z",
+        ),
+        (
+            one_vertex_ply(&format!("{xyz}{face}0 0 0\n3 0 0 1\n")),
+            "face 0 names vertex 1, but there are 1",
+        ),
+        (one_vertex_ply(&format!("{xyz}{face}0 0 0\n2 0 0\n")), "has no face"),
+        (one_vertex_ply(&format!("{xyz}{face}0 nan 0\n3 0 0 0\n")), "vertex 0 are not finite"),
     ] {
         let error = parse_mesh(text.as_bytes(), Path::new("x.ply")).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
@@ -232,32 +249,33 @@ fn a_cloud_keeps_its_columns() {
     assert_eq!(read.normals, cloud().normals);
     assert_eq!(read.support, cloud().support);
     assert!(read.sigma[2].is_nan() && read.sigma[1] == 0.25);
-    let scaled = read_cloud_in(&path, Unit::Mm).unwrap_err().to_string();
+    let scaled = read_cloud_with_unit(&path, Unit::Millimetre).unwrap_err().to_string();
     assert!(scaled.contains("leave out --unit mm"), "{scaled}");
+}
+
+/// An ASCII file with float properties of its vertices.
+fn cloud_ply(properties: &str, rows: &str) -> String {
+    let properties: String =
+        properties.split(' ').map(|p| format!("property float {p}\n")).collect();
+    let count = rows.lines().count();
+    format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}\n")
 }
 
 #[test]
 fn a_cloud_without_normals_or_in_millimetres_is_refused() {
-    let ply = |properties: &str, rows: &str| {
-        let properties: String =
-            properties.split(' ').map(|p| format!("property float {p}\n")).collect();
-        let count = rows.lines().count();
-        format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}\n")
-    };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.ply");
-    let error = |text: String| {
-        std::fs::write(&path, text).unwrap();
-        read_cloud(&path).unwrap_err().to_string()
-    };
-    let told = error(ply("x y z", "0 0 0"));
-    assert!(told.contains("scan folder with poses.json"), "{told}");
     let pcl = "x y z normal_x normal_y normal_z";
-    let told = error(ply(pcl, "0 0 0 0 0 1\n100 0 0 0 0 1"));
-    assert!(told.contains("millimetres? use --unit mm"), "{told}");
-    let told = error(ply(pcl, "0 0 0 0 0 0\nnan 0 0 0 0 1\n0 0 0 nan 0 1"));
-    assert!(told.contains("none of its 3 points"), "{told}");
-    std::fs::write(&path, ply(pcl, "0 0 0 0 0 2\nnan 0 0 0 0 1")).unwrap();
+    for (properties, rows, says) in [
+        ("x y z", "0 0 0", "scan folder with poses.json"),
+        (pcl, "0 0 0 0 0 1\n100 0 0 0 0 1", "millimetres? use --unit mm"),
+        (pcl, "0 0 0 0 0 0\nnan 0 0 0 0 1\n0 0 0 nan 0 1", "none of its 3 points"),
+    ] {
+        std::fs::write(&path, cloud_ply(properties, rows)).unwrap();
+        let error = read_cloud(&path).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+    std::fs::write(&path, cloud_ply(pcl, "0 0 0 0 0 2\nnan 0 0 0 0 1")).unwrap();
     let cloud = read_cloud(&path).unwrap();
     assert_eq!((cloud.normals, cloud.support), (vec![Vec3::z()], vec![1]));
 }

@@ -1,58 +1,68 @@
-//! The unit of a file's coordinates, and the check that catches the wrong one.
+//! The unit of a file's coordinates, and a check that detects a wrong one.
 
-/// Largest extent that is believed to be metres.
-const LARGEST: f64 = 10.0;
-/// Smallest extent that is believed to be millimetres once the user said so, metres.
-const SMALLEST: f64 = 1e-3;
-/// Share of the points left out at either end, so that single far outliers do not look like a wrong unit.
-const TRIM: f64 = 0.01;
-/// Points looked at: enough for the share above.
-const SAMPLES: usize = 20_000;
+/// Metres in a millimetre.
+const METRES_PER_MILLIMETRE: f64 = 1e-3;
+/// Largest extent that is plausible in metres.
+const MAX_EXTENT_M: f64 = 10.0;
+/// Smallest extent that is plausible for coordinates that the user declares to be millimetres.
+const MIN_EXTENT_M: f64 = 1e-3;
+/// Share of the points that is left out at either end, so that few far outliers do not look like a
+/// wrong unit.
+const TRIM_RATIO: f64 = 0.01;
+/// Limit of the points that are examined: enough for the share above.
+const MAX_SAMPLES: usize = 20_000;
 
 /// The unit of a file's lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unit {
     /// Metres.
     #[default]
-    M,
+    Metre,
     /// Millimetres.
-    Mm,
+    Millimetre,
 }
 
 impl Unit {
     /// Metres in one unit.
-    pub fn metres(self) -> f64 {
+    pub fn metres_per_unit(self) -> f64 {
         match self {
-            Unit::M => 1.0,
-            Unit::Mm => 1e-3,
+            Unit::Metre => 1.0,
+            Unit::Millimetre => METRES_PER_MILLIMETRE,
         }
     }
 }
 
 /// The largest extent along an axis, between the 1st and the 99th percentile of the finite points.
-pub(crate) fn largest_extent(points: impl ExactSizeIterator<Item = [f64; 3]>) -> f64 {
-    let step = points.len().div_ceil(SAMPLES).max(1);
+pub(crate) fn trimmed_extent(points: impl ExactSizeIterator<Item = [f64; 3]>) -> f64 {
+    let step = points.len().div_ceil(MAX_SAMPLES).max(1);
     let sample: Vec<[f64; 3]> =
         points.step_by(step).filter(|p| p.iter().all(|v| v.is_finite())).collect();
-    let extent = |axis: usize| {
-        let mut values: Vec<f64> = sample.iter().map(|p| p[axis]).collect();
-        let trim = (TRIM * values.len() as f64) as usize;
-        let mut at = |index: usize| *values.select_nth_unstable_by(index, f64::total_cmp).1;
-        at(sample.len() - 1 - trim) - at(trim)
-    };
-    if sample.is_empty() { 0.0 } else { (0..3).map(extent).fold(0.0, f64::max) }
+    if sample.is_empty() {
+        return 0.0;
+    }
+    (0..3).map(|axis| trimmed_range(sample.iter().map(|p| p[axis]).collect())).fold(0.0, f64::max)
 }
 
-/// Refuses coordinates that must be in another unit; `extent` is in metres after the conversion from `unit`.
+/// The range of the values without the smallest and the largest ones.
+fn trimmed_range(mut values: Vec<f64>) -> f64 {
+    let trim = (TRIM_RATIO * values.len() as f64) as usize;
+    let last = values.len() - 1 - trim;
+    let high = *values.select_nth_unstable_by(last, f64::total_cmp).1;
+    let low = *values.select_nth_unstable_by(trim, f64::total_cmp).1;
+    high - low
+}
+
+/// Returns an error message for coordinates that must be in another unit; `extent` is in metres
+/// after the conversion from `unit`.
 pub(crate) fn check_extent(extent: f64, unit: Unit) -> std::result::Result<(), String> {
     match unit {
-        Unit::M if extent > LARGEST => Err(format!(
-            "its coordinates span {extent:.4} m, more than {LARGEST} m: millimetres? use --unit mm"
+        Unit::Metre if extent > MAX_EXTENT_M => Err(format!(
+            "its coordinates span {extent:.4} m, more than {MAX_EXTENT_M} m: millimetres? use --unit mm"
         )),
-        Unit::Mm if extent > LARGEST => {
+        Unit::Millimetre if extent > MAX_EXTENT_M => {
             Err(format!("its coordinates span {extent:.4} m even as millimetres: check its unit"))
         }
-        Unit::Mm if extent < SMALLEST => Err(format!(
+        Unit::Millimetre if extent < MIN_EXTENT_M => Err(format!(
             "its coordinates span only {:.4} mm if they are millimetres: metres? leave out --unit mm",
             extent * 1e3
         )),
@@ -64,17 +74,21 @@ pub(crate) fn check_extent(extent: f64, unit: Unit) -> std::result::Result<(), S
 mod tests {
     use super::*;
 
+    /// Points along x over this length.
+    fn line(length: f64) -> impl ExactSizeIterator<Item = [f64; 3]> {
+        (0..1000u16).map(move |i| [f64::from(i) / 999.0 * length, 0.0, 0.0])
+    }
+
     #[test]
     fn a_wrong_unit_is_told_and_outliers_are_not_taken_for_one() {
-        let line = |length: f64| (0..1000).map(move |i| [f64::from(i) / 999.0 * length, 0.0, 0.0]);
-        assert!(check_extent(largest_extent(line(0.2)), Unit::M).is_ok());
-        let millimetres = check_extent(largest_extent(line(200.0)), Unit::M).unwrap_err();
+        assert!(check_extent(trimmed_extent(line(0.2)), Unit::Metre).is_ok());
+        let millimetres = check_extent(trimmed_extent(line(200.0)), Unit::Metre).unwrap_err();
         assert!(millimetres.contains("millimetres? use --unit mm"), "{millimetres}");
-        let metres = check_extent(largest_extent(line(0.2e-3)), Unit::Mm).unwrap_err();
+        let metres = check_extent(trimmed_extent(line(0.2e-3)), Unit::Millimetre).unwrap_err();
         assert!(metres.contains("leave out --unit mm"), "{metres}");
         let mut points: Vec<[f64; 3]> = line(0.2).collect();
         points[7] = [50.0, 0.0, f64::NAN];
         points[8] = [50.0, 0.0, 0.0];
-        assert!(largest_extent(points.into_iter()) < 0.2);
+        assert!(trimmed_extent(points.into_iter()) < 0.2);
     }
 }

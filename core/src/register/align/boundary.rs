@@ -1,35 +1,54 @@
-//! Which points of a scan lie at its border: beyond them the surface goes on unseen, so that a closest point there says
-//! nothing about where along the surface it belongs (Turk & Levoy 1994, §5).
+//! Which points of a scan lie at its border: beyond them the surface goes on unseen, so that a
+//! closest point there says nothing about where along the surface it belongs (Turk & Levoy 1994,
+//! §5).
 
 use crate::geometry::{Vec3, any_orthogonal};
 use crate::voxel::CellIndex;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// A point whose neighbours leave a gap of this angle about it lies at the border: the angle criterion of Bendels,
-/// Schnabel & Klein 2006, Detecting Holes in Point Set Surfaces, §4.1. On a straight border the gap is pi.
-const GAP: f64 = 0.75 * PI;
-/// Neighbours are looked for within this many distances between points.
-const REACH: f64 = 2.5;
+/// A point whose neighbours leave a gap of this angle about it lies at the border: the angle
+/// criterion of Bendels, Schnabel & Klein 2006, Detecting Holes in Point Set Surfaces, §4.1. On a
+/// straight border the gap is pi.
+const MAX_NEIGHBOUR_GAP_RAD: f64 = 0.75 * PI;
+/// Radius within which neighbours are searched, in distances between points: it holds about twenty.
+const NEIGHBOUR_RADIUS_RATIO: f64 = 2.5;
+/// Room for the neighbours of a point, so that the list rarely has to grow.
+const NEIGHBOUR_CAPACITY: usize = 32;
 
-/// Whether each point lies at the border of the surface that the oriented points sample; `spacing` is the distance
-/// between them, metres.
-pub(crate) fn boundary(points: &[Vec3], normals: &[Vec3], spacing: f64) -> Vec<bool> {
-    let radius = REACH * spacing;
+/// Whether each point lies at the border of the surface that the oriented points sample; `spacing`
+/// is the distance between them, metres.
+pub(crate) fn find_boundary(points: &[Vec3], normals: &[Vec3], spacing: f64) -> Vec<bool> {
+    let radius = NEIGHBOUR_RADIUS_RATIO * spacing;
     let cells = CellIndex::new(points, radius);
-    let at_border = |i: usize| {
-        let u = any_orthogonal(&normals[i]);
-        let v = normals[i].cross(&u);
-        let mut angles = Vec::with_capacity(32);
-        cells.for_each_within(points, &points[i], radius, |j, _| {
-            let away = points[j] - points[i];
-            if j != i && normals[j].dot(&normals[i]) > 0.0 {
-                angles.push(away.dot(&v).atan2(away.dot(&u)));
-            }
-        });
-        largest_gap(&mut angles) > GAP
-    };
-    (0..points.len()).into_par_iter().map(at_border).collect()
+    (0..points.len())
+        .into_par_iter()
+        .map(|i| {
+            let mut angles = neighbour_angles(points, normals, &cells, radius, i);
+            largest_gap(&mut angles) > MAX_NEIGHBOUR_GAP_RAD
+        })
+        .collect()
+}
+
+/// Directions in which the neighbours of point `i` on its side of the surface lie, as angles in the
+/// tangent plane, radians.
+fn neighbour_angles(
+    points: &[Vec3],
+    normals: &[Vec3],
+    cells: &CellIndex,
+    radius: f64,
+    i: usize,
+) -> Vec<f64> {
+    let u = any_orthogonal(&normals[i]);
+    let v = normals[i].cross(&u);
+    let mut angles = Vec::with_capacity(NEIGHBOUR_CAPACITY);
+    cells.for_each_within(points, &points[i], radius, |j, _| {
+        let away = points[j] - points[i];
+        if j != i && normals[j].dot(&normals[i]) > 0.0 {
+            angles.push(away.dot(&v).atan2(away.dot(&u)));
+        }
+    });
+    angles
 }
 
 /// The largest angle between directions that follow each other round the circle, radians.
@@ -46,17 +65,18 @@ mod tests {
 
     #[test]
     fn the_rim_of_a_plate_with_a_hole_is_found_and_nothing_else() {
-        let place = |i: usize| (i % 30, i / 30);
-        let hole = |(x, y): (usize, usize)| (12..18).contains(&x) && (12..18).contains(&y);
-        let kept: Vec<(usize, usize)> = (0..900).map(place).filter(|p| !hole(*p)).collect();
+        let hole = 12..18;
+        let kept: Vec<(usize, usize)> = (0..900)
+            .map(|i| (i % 30, i / 30))
+            .filter(|(x, y)| !(hole.contains(x) && hole.contains(y)))
+            .collect();
         let points: Vec<Vec3> =
             kept.iter().map(|&(x, y)| Vec3::new(x as f64, y as f64, 0.0)).collect();
-        let found = boundary(&points, &vec![Vec3::z(); points.len()], 1.0);
+        let found = find_boundary(&points, &vec![Vec3::z(); points.len()], 1.0);
         for (&(x, y), &flag) in kept.iter().zip(&found) {
             let outer = x == 0 || y == 0 || x == 29 || y == 29;
-            let beside = |a: usize, b: usize| (13..17).contains(&a) && (b == 11 || b == 18);
             let near = (11..19).contains(&x) && (11..19).contains(&y);
-            if outer || beside(x, y) || beside(y, x) {
+            if outer || lies_beside_hole(x, y) || lies_beside_hole(y, x) {
                 assert!(flag, "{x} {y}");
             } else if !near {
                 assert!(!flag, "{x} {y}");
@@ -64,8 +84,12 @@ mod tests {
         }
     }
 
+    fn lies_beside_hole(along: usize, across: usize) -> bool {
+        (13..17).contains(&along) && (across == 11 || across == 18)
+    }
+
     #[test]
     fn a_lone_point_is_a_border() {
-        assert_eq!(boundary(&[Vec3::zeros()], &[Vec3::z()], 1.0), [true]);
+        assert_eq!(find_boundary(&[Vec3::zeros()], &[Vec3::z()], 1.0), [true]);
     }
 }

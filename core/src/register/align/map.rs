@@ -1,61 +1,71 @@
 //! The map that scans are aligned to.
 //!
-//! What a scan shows of known surface adds no point and costs a look into a hash map. New points have the search tree
-//! built anew: over a hundred scans about twice as fast as a forest of trees (Bentley & Saxe 1980), whose newer trees hold
-//! scattered points and make every search longer.
+//! A scan that shows known surface adds no point and costs a look-up in a hash map. New points have
+//! the search tree built anew: over a hundred scans that is about twice as fast as a forest of
+//! trees (Bentley & Saxe 1980), whose newer trees hold scattered points and make every search
+//! longer.
 
-use crate::geometry::{KdTree, Pose, Vec3};
+use crate::geometry::{KdTree, Pose, Vec3, transform};
 use crate::voxel::{Voxel, voxel_of};
 use rustc_hash::FxHashMap;
 
-/// Oriented points in the object frame that scans are aligned to: at most one a voxel and side, so that the map
-/// grows with the surface, not with the number of scans. It is the mean of what the scans saw there when the tree was
-/// built: their noise makes fewer places where a scan may come to rest wrongly.
+/// Oriented points in the object frame that scans are aligned to: at most one a voxel and side of
+/// the surface, so that the map grows with the surface, not with the number of scans. Each is the
+/// mean of what the scans had measured there when the tree was built: with less noise there are
+/// fewer local minima.
 pub(crate) struct Map {
     points: Vec<Vec3>,
     normals: Vec<Vec3>,
-    seen: Vec<Seen>,
+    /// Sums of which the points are the means.
+    sums: Vec<VoxelSum>,
     /// Whether the point lies at the border of all scans that saw its voxel.
     boundary: Vec<bool>,
+    /// Edge of the voxels, metres.
     voxel: f64,
-    taken: FxHashMap<(Voxel, usize), u32>,
+    /// Index of the point of each voxel and side.
+    indices: FxHashMap<(Voxel, usize), u32>,
     tree: KdTree,
 }
 
-/// What scans are added to the map as: points with unit normals, sensor frame, and whether each lies at the scan's
-/// border (empty: none does).
+/// A surface that is added to the map, sensor frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Surface<'a> {
+pub(crate) struct MapSurface<'a> {
+    /// Metres.
     pub points: &'a [Vec3],
+    /// Unit normals.
     pub normals: &'a [Vec3],
+    /// Whether each point lies at the border of the scan; empty if none does.
     pub boundary: &'a [bool],
 }
 
-/// Sums over what was seen of a voxel's side.
-struct Seen {
+/// Sums over the measurements of one side of the surface in a voxel.
+struct VoxelSum {
     point: Vec3,
     normal: Vec3,
     count: f64,
 }
 
-/// A point of the map.
+/// A point of the map, object frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Target {
+pub(crate) struct MapPoint {
+    /// Metres.
     pub point: Vec3,
+    /// Unit normal.
     pub normal: Vec3,
+    /// Whether it lies at the border of all scans that saw it.
     pub boundary: bool,
 }
 
 impl Map {
-    /// An empty map with one point per voxel of edge `voxel` (metres).
+    /// An empty map with one point a voxel of edge `voxel` (metres).
     pub(crate) fn new(voxel: f64) -> Map {
         Map {
             points: Vec::new(),
             normals: Vec::new(),
-            seen: Vec::new(),
+            sums: Vec::new(),
             boundary: Vec::new(),
             voxel,
-            taken: FxHashMap::default(),
+            indices: FxHashMap::default(),
             tree: KdTree::new(&[]),
         }
     }
@@ -65,68 +75,71 @@ impl Map {
         self.voxel
     }
 
-    /// The map of surfaces (sensor frame), each seen from its pose; the tree is built once.
-    pub(crate) fn of<'a>(
-        surfaces: impl Iterator<Item = (Surface<'a>, &'a Pose)>,
+    /// The map of surfaces (sensor frame), each with its pose `object_from_sensor`; the tree is
+    /// built once.
+    pub(crate) fn from_surfaces<'a>(
+        surfaces: impl Iterator<Item = (MapSurface<'a>, &'a Pose)>,
         voxel: f64,
     ) -> Map {
         let mut map = Map::new(voxel);
         for (surface, pose) in surfaces {
-            map.take(&surface, pose);
+            map.accumulate(&surface, pose);
         }
-        map.build();
+        map.rebuild_tree();
         map
     }
 
-    /// Adds oriented points (sensor frame) seen from `pose`. Returns how many points were built into the tree.
-    pub(crate) fn insert(&mut self, surface: &Surface, pose: &Pose) -> usize {
-        self.take(surface, pose);
-        if self.seen.len() == self.points.len() {
+    /// Adds a surface (sensor frame) with its pose `object_from_sensor`. Returns how many points
+    /// were built into the tree: 0 if no voxel is new.
+    pub(crate) fn insert(&mut self, surface: &MapSurface, pose: &Pose) -> usize {
+        self.accumulate(surface, pose);
+        if self.sums.len() == self.points.len() {
             return 0;
         }
-        self.build();
+        self.rebuild_tree();
         self.points.len()
     }
 
-    fn build(&mut self) {
-        self.points = self.seen.iter().map(|s| s.point / s.count).collect();
-        // Of one side of a cube, normals do not cancel.
-        self.normals = self.seen.iter().map(|s| s.normal.normalize()).collect();
+    fn rebuild_tree(&mut self) {
+        self.points = self.sums.iter().map(|sum| sum.point / sum.count).collect();
+        // The normals of one side of a cube do not cancel.
+        self.normals = self.sums.iter().map(|sum| sum.normal.normalize()).collect();
         self.tree = KdTree::new(&self.points);
     }
 
-    /// Adds points that the tree does not know yet.
-    fn take(&mut self, surface: &Surface, pose: &Pose) {
+    /// Adds the points to the sums; the tree is rebuilt later.
+    fn accumulate(&mut self, surface: &MapSurface, pose: &Pose) {
         for (i, (p, n)) in surface.points.iter().zip(surface.normals).enumerate() {
-            let (point, normal) = (pose.rotation * p + pose.translation.vector, pose.rotation * n);
+            let (point, normal) = (transform(pose, p), pose.rotation * n);
             let boundary = surface.boundary.get(i).copied().unwrap_or(false);
             // The six sides of a cube are enough to keep the faces of a thin wall apart.
             let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
-            let next = self.seen.len() as u32;
-            let index = *self.taken.entry((voxel_of(&point, self.voxel), side)).or_insert(next);
+            let next = self.sums.len() as u32;
+            let key = (voxel_of(&point, self.voxel), side);
+            let index = *self.indices.entry(key).or_insert(next);
             if index == next {
-                self.seen.push(Seen { point, normal, count: 1.0 });
+                self.sums.push(VoxelSum { point, normal, count: 1.0 });
                 self.boundary.push(boundary);
             } else {
-                let seen = &mut self.seen[index as usize];
-                seen.point += point;
-                seen.normal += normal;
-                seen.count += 1.0;
+                let sum = &mut self.sums[index as usize];
+                sum.point += point;
+                sum.normal += normal;
+                sum.count += 1.0;
                 self.boundary[index as usize] &= boundary;
             }
         }
     }
 
     /// The nearest point within `radius` (metres) of `query` (object frame).
-    pub(crate) fn nearest_within(&self, query: &Vec3, radius: f64) -> Option<Target> {
+    pub(crate) fn nearest_within(&self, query: &Vec3, radius: f64) -> Option<MapPoint> {
         self.nearest(query).filter(|(_, distance)| *distance <= radius).map(|(target, _)| target)
     }
 
     /// The nearest point to `query` (object frame) and its distance, metres.
-    pub(crate) fn nearest(&self, query: &Vec3) -> Option<(Target, f64)> {
+    pub(crate) fn nearest(&self, query: &Vec3) -> Option<(MapPoint, f64)> {
         let (i, square) = self.tree.nearest(query)?;
         let (point, normal, boundary) = (self.points[i], self.normals[i], self.boundary[i]);
-        Some((Target { point, normal, boundary }, square.sqrt()))
+        Some((MapPoint { point, normal, boundary }, square.sqrt()))
     }
 }
 
@@ -139,20 +152,21 @@ mod tests {
     /// Points of a sphere of radius 1 m about the origin with a little noise, seen by scan `seed`.
     fn sphere(seed: u64, count: usize) -> (Vec<Vec3>, Vec<Vec3>) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut point = || {
-            let z: f64 = rng.random_range(-1.0..1.0);
-            let angle: f64 = rng.random_range(0.0..std::f64::consts::TAU);
-            let flat = (1.0 - z * z).sqrt();
-            let normal = Vec3::new(flat * angle.cos(), flat * angle.sin(), z);
-            (normal * rng.random_range(0.995..1.005), normal)
-        };
-        (0..count).map(|_| point()).unzip()
+        (0..count).map(|_| sphere_point(&mut rng)).unzip()
+    }
+
+    fn sphere_point(rng: &mut ChaCha8Rng) -> (Vec3, Vec3) {
+        let z: f64 = rng.random_range(-1.0..1.0);
+        let angle: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+        let flat = (1.0 - z * z).sqrt();
+        let normal = Vec3::new(flat * angle.cos(), flat * angle.sin(), z);
+        (normal * rng.random_range(0.995..1.005), normal)
     }
 
     fn add(map: &mut Map, seed: u64, count: usize) -> usize {
         let (points, normals) = sphere(seed, count);
         map.insert(
-            &Surface { points: &points, normals: &normals, boundary: &[] },
+            &MapSurface { points: &points, normals: &normals, boundary: &[] },
             &Pose::identity(),
         )
     }
@@ -191,15 +205,13 @@ mod tests {
     fn a_place_that_some_scan_saw_whole_is_no_boundary() {
         let mut map = Map::new(0.1);
         let (points, normals) = sphere(1, 50);
-        let insert = |map: &mut Map, border: bool| {
-            let boundary = vec![border; 50];
-            let surface = Surface { points: &points, normals: &normals, boundary: &boundary };
-            map.insert(&surface, &Pose::identity())
-        };
-        insert(&mut map, true);
+        let (border, inner) = ([true; 50], [false; 50]);
+        let at_border = MapSurface { points: &points, normals: &normals, boundary: &border };
+        let whole = MapSurface { boundary: &inner, ..at_border };
+        map.insert(&at_border, &Pose::identity());
         assert!(map.nearest_within(&points[7], 0.1).unwrap().boundary);
-        insert(&mut map, false);
-        insert(&mut map, true);
+        map.insert(&whole, &Pose::identity());
+        map.insert(&at_border, &Pose::identity());
         assert!(!map.nearest_within(&points[7], 0.1).unwrap().boundary);
     }
 }

@@ -1,238 +1,183 @@
-//! Stage 2: which point of the map each point of the scan should lie on (Rusinkiewicz & Levoy 2001, §3.2).
+//! Stage 2: which point of the map each point of the scan should lie on (Rusinkiewicz & Levoy 2001,
+//! §3.2).
 
-use super::map::{Map, Target};
-use super::{Moving, halfway};
-use crate::geometry::{KdTree, Pose, Vec3};
-use crate::register::RegisterParams;
+use super::map::{Map, MapPoint};
+use super::source::Source;
+use crate::geometry::{KdTree, MIN_INCIDENCE_COS, Pose, Vec3, transform};
+use crate::register::params::Matching;
 use rayon::prelude::*;
 
-crate::choice! {
-    /// Which point of the map a point of the scan should lie on.
-    pub enum Matching {
-        /// The closest (Besl & McKay 1992).
-        Closest = "closest",
-        /// The closest, if of the scan's points this one is the closest to it (Pajdla & Van Gool 1995).
-        Mutual = "mutual",
-        /// Where the point's ray meets the map: the tangent planes of closest points are met in turn (Chen & Medioni
-        /// 1992, §3.2, there along the normal).
-        Projective = "projective",
-    }
-}
+/// Planes that a ray is intersected with at most: each step leaves of the distance to a smooth
+/// surface its square.
+const MAX_PLANES: usize = 3;
+/// No point of the surface lies farther from the map's nearest than this many voxels...
+const MAX_SURFACE_VOXELS: f64 = 2.0;
+/// ...and standard deviations of the noise.
+const MAX_SURFACE_SIGMAS: f64 = 3.0;
 
 /// A point of the scan and the point of the map that it should lie on.
 pub(crate) struct Correspondence {
     /// Which of the scan's points.
     pub index: usize,
-    /// The scan's point, sensor frame.
+    /// The scan's point, sensor frame, metres.
     pub point: Vec3,
+    /// The point of the map, object frame, metres.
     pub target: Vec3,
-    /// Unit normals of the scan's point and of the target, object frame.
-    pub here: Vec3,
-    pub there: Vec3,
+    /// Unit normal of the scan's point, object frame.
+    pub source_normal: Vec3,
+    /// Unit normal of the target, object frame.
+    pub target_normal: Vec3,
     /// Normal of the plane halfway between the two points' tangent planes, object frame.
     pub normal: Vec3,
-    /// Signed distance along `normal`, and the distance between the points, metres.
-    pub distance: f64,
-    pub gap: f64,
+    /// Signed distance of the scan's point from the target along `normal`, metres.
+    pub plane_distance: f64,
+    /// Distance between the points, metres.
+    pub point_distance: f64,
     /// Whether the target lies at the border of what the scans saw.
     pub boundary: bool,
 }
 
 impl Correspondence {
     /// Cosine of the angle between the normals.
-    pub(crate) fn agreement(&self) -> f64 {
-        self.here.dot(&self.there)
+    pub(crate) fn normal_cos(&self) -> f64 {
+        self.source_normal.dot(&self.target_normal)
     }
 }
-
-/// Planes that a ray is intersected with at most: each step leaves of the distance to a smooth surface its square.
-const PLANES: usize = 3;
-/// A ray nearer to its plane than this (cosine of 80 degrees from the normal) meets it anywhere.
-const GRAZING: f64 = 0.17;
 
 /// Finds correspondences of the points of one scan.
 pub(crate) struct Matcher<'a> {
-    moving: Moving<'a>,
+    source: Source<'a>,
     map: &'a Map,
     matching: Matching,
-    /// Over the scan's points, where they have to be found back.
-    back: Option<KdTree>,
-    /// Where each point was last, and how far from the map, metres.
-    last: Vec<(Vec3, f64)>,
+    /// Over the scan's points, for [`Matching::Mutual`].
+    source_tree: Option<KdTree>,
+    /// The last search of each point.
+    searches: Vec<LastSearch>,
+}
+
+/// Where a point was when its nearest point of the map was searched last.
+struct LastSearch {
+    /// Position of the point, object frame, metres.
+    position: Vec3,
+    /// Its distance from the map, metres; minus infinity before the first search.
+    distance: f64,
+}
+
+impl Default for LastSearch {
+    /// Before the first search, the point may be anywhere.
+    fn default() -> LastSearch {
+        LastSearch { position: Vec3::zeros(), distance: f64::NEG_INFINITY }
+    }
 }
 
 impl<'a> Matcher<'a> {
-    pub(crate) fn new(moving: Moving<'a>, map: &'a Map, params: &RegisterParams) -> Matcher<'a> {
-        let matching = params.stages().matching;
-        let back = (matching == Matching::Mutual).then(|| KdTree::new(moving.points));
-        // Nothing is known yet: anything may be near.
-        let last = vec![(Vec3::zeros(), f64::NEG_INFINITY); moving.points.len()];
-        Matcher { moving, map, matching, back, last }
+    pub(crate) fn new(source: Source<'a>, map: &'a Map, matching: Matching) -> Matcher<'a> {
+        let source_tree = (matching == Matching::Mutual).then(|| KdTree::new(source.points));
+        let searches = source.points.iter().map(|_| LastSearch::default()).collect();
+        Matcher { source, map, matching, source_tree, searches }
     }
 
-    /// Pairs of the scan's points at `pose` and the map's within `reach` (metres), in the order of the points.
+    /// Pairs of the scan's points at `pose` and the map's within `reach` (metres), in the order of
+    /// the points.
     pub(crate) fn find(&mut self, pose: &Pose, reach: f64) -> Vec<Correspondence> {
-        let mut last = std::mem::take(&mut self.last);
-        let at = |(i, last): (usize, &mut (Vec3, f64))| self.pair(i, last, pose, reach);
-        let found = last.par_iter_mut().enumerate().filter_map(at).collect();
-        self.last = last;
-        found
+        let mut searches = std::mem::take(&mut self.searches);
+        let pairs = searches
+            .par_iter_mut()
+            .enumerate()
+            .filter_map(|(i, search)| self.match_point(i, search, pose, reach))
+            .collect();
+        self.searches = searches;
+        pairs
     }
 
-    fn pair(
+    fn match_point(
         &self,
         index: usize,
-        last: &mut (Vec3, f64),
+        search: &mut LastSearch,
         pose: &Pose,
         reach: f64,
     ) -> Option<Correspondence> {
-        let point = self.moving.points[index];
-        let moved = pose.rotation * point + pose.translation.vector;
-        let found = match self.matching {
-            Matching::Closest => self.closest(last, &moved, reach)?,
-            Matching::Mutual => self.mutual(index, &moved, pose, reach)?,
+        let point = self.source.points[index];
+        let moved = transform(pose, &point);
+        let target = match self.matching {
+            Matching::Closest => self.closest(search, &moved, reach)?,
+            Matching::Mutual => self.mutually_closest(index, &moved, pose, reach)?,
             Matching::Projective => {
-                self.along_ray(&moved, &(pose.rotation * self.moving.rays[index]), reach)?
+                self.along_ray(&moved, &(pose.rotation * self.source.rays[index]), reach)?
             }
         };
-        let (here, there) = (pose.rotation * self.moving.normals[index], found.normal);
+        let (here, there) = (pose.rotation * self.source.normals[index], target.normal);
         let agreement = there.dot(&here);
         // Planes that face away from each other have none halfway.
-        let normal = if agreement > 0.0 { halfway(&there, &here, agreement) } else { there };
-        let between = moved - found.point;
+        let normal =
+            if agreement > 0.0 { symmetric_normal(&there, &here, agreement) } else { there };
+        let between = moved - target.point;
         Some(Correspondence {
             index,
             point,
-            target: found.point,
-            here,
-            there,
+            target: target.point,
+            source_normal: here,
+            target_normal: there,
             normal,
-            distance: normal.dot(&between),
-            gap: between.norm(),
-            boundary: found.boundary,
+            plane_distance: normal.dot(&between),
+            point_distance: between.norm(),
+            boundary: target.boundary,
         })
     }
 
-    /// A point came no nearer to the map than it moved: most of those that are far off need no search, which would take
-    /// longest for them.
-    fn closest(&self, last: &mut (Vec3, f64), moved: &Vec3, reach: f64) -> Option<Target> {
-        if last.1 - (moved - last.0).norm() > reach {
+    /// The closest point of the map. Since its last search, a point came no nearer to the map than
+    /// it has moved: most of the distant ones need no search, which would take longest for them.
+    fn closest(&self, search: &mut LastSearch, moved: &Vec3, reach: f64) -> Option<MapPoint> {
+        if search.distance - (moved - search.position).norm() > reach {
             return None;
         }
         let (target, distance) = self.map.nearest(moved)?;
-        *last = (*moved, distance);
+        *search = LastSearch { position: *moved, distance };
         (distance <= reach).then_some(target)
     }
 
-    fn mutual(&self, index: usize, moved: &Vec3, pose: &Pose, reach: f64) -> Option<Target> {
-        let found = self.map.nearest_within(moved, reach)?;
-        let seen = pose.inverse_transform_point(&found.point.into()).coords;
-        let (back, _) = self.back.as_ref()?.nearest(&seen)?;
-        (back == index).then_some(found)
+    /// The closest point of the map, if point `index` is the closest of the scan's to it.
+    fn mutually_closest(
+        &self,
+        index: usize,
+        moved: &Vec3,
+        pose: &Pose,
+        reach: f64,
+    ) -> Option<MapPoint> {
+        let target = self.map.nearest_within(moved, reach)?;
+        let seen = pose.inverse_transform_point(&target.point.into()).coords;
+        let (back, _) = self.source_tree.as_ref()?.nearest(&seen)?;
+        (back == index).then_some(target)
     }
 
     /// Where the line through `moved` along the unit vector `ray` meets the map.
-    fn along_ray(&self, moved: &Vec3, ray: &Vec3, reach: f64) -> Option<Target> {
-        let mut found = self.map.nearest_within(moved, reach)?;
+    fn along_ray(&self, moved: &Vec3, ray: &Vec3, reach: f64) -> Option<MapPoint> {
+        let mut target = self.map.nearest_within(moved, reach)?;
         for step in 1.. {
-            let slope = found.normal.dot(ray);
-            if slope.abs() < GRAZING {
+            let slope = target.normal.dot(ray);
+            if slope.abs() < MIN_INCIDENCE_COS {
                 return None;
             }
-            let met = moved + ray * (found.normal.dot(&(found.point - moved)) / slope);
-            if (met - moved).norm_squared() > reach * reach {
+            let hit = moved + ray * (target.normal.dot(&(target.point - moved)) / slope);
+            if (hit - moved).norm_squared() > reach * reach {
                 return None;
             }
-            // On the surface no point is farther from the map than its voxels and the noise have it.
-            let near = 2.0 * self.map.voxel() + 3.0 * self.moving.noise;
-            let next = self.map.nearest_within(&met, if step < PLANES { reach } else { near })?;
-            if step == PLANES {
-                return Some(Target { point: met, ..found });
+            let at_surface =
+                MAX_SURFACE_VOXELS * self.map.voxel() + MAX_SURFACE_SIGMAS * self.source.noise;
+            let radius = if step < MAX_PLANES { reach } else { at_surface };
+            let next = self.map.nearest_within(&hit, radius)?;
+            if step == MAX_PLANES {
+                return Some(MapPoint { point: hit, ..target });
             }
-            found = next;
+            target = next;
         }
         None
     }
 }
 
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::super::map::Surface;
-    use super::*;
-
-    /// The point `index` of a scan that lies at (0, 0, 1) in the sensor frame, `gap` above its target.
-    pub(crate) fn pair(index: usize, gap: f64) -> Correspondence {
-        Correspondence {
-            index,
-            point: Vec3::z(),
-            target: Vec3::z() * (1.0 - gap),
-            here: Vec3::z(),
-            there: Vec3::z(),
-            normal: Vec3::z(),
-            distance: gap,
-            gap,
-            boundary: false,
-        }
-    }
-
-    /// A plate at z = 0 of 41 x 41 points, 1 m apart about the origin.
-    fn plate() -> Map {
-        let points: Vec<Vec3> = (0..41 * 41)
-            .map(|i| Vec3::new(f64::from(i % 41 - 20), f64::from(i / 41 - 20), 0.0))
-            .collect();
-        let normals = vec![Vec3::z(); points.len()];
-        let mut map = Map::new(1.0);
-        let surface = Surface { points: &points, normals: &normals, boundary: &[] };
-        map.insert(&surface, &Pose::identity());
-        map
-    }
-
-    fn found(matching: Matching, points: &[Vec3]) -> Vec<Correspondence> {
-        let normals = vec![Vec3::z(); points.len()];
-        let rays = vec![Vec3::new(0.6, 0.0, -0.8); points.len()];
-        let moving = Moving { points, normals: &normals, rays: &rays, noise: 0.01 };
-        let params = RegisterParams { matching, ..RegisterParams::default() };
-        Matcher::new(moving, &plate(), &params).find(&Pose::identity(), 10.0)
-    }
-
-    #[test]
-    fn a_ray_meets_the_plate_where_geometry_says() {
-        let found = found(Matching::Projective, &[Vec3::new(1.3, 0.2, 4.0)]);
-        assert!((found[0].target - Vec3::new(4.3, 0.2, 0.0)).norm() < 1e-12, "{}", found[0].target);
-        assert!((found[0].gap - 5.0).abs() < 1e-12);
-        assert!((found[0].distance - 4.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_ray_that_leaves_the_plate_meets_nothing() {
-        assert!(found(Matching::Projective, &[Vec3::new(18.0, 0.0, 7.0)]).is_empty());
-        assert_eq!(found(Matching::Closest, &[Vec3::new(18.0, 0.0, 7.0)]).len(), 1);
-    }
-
-    #[test]
-    fn of_two_points_above_one_target_the_nearer_is_mutually_closest() {
-        let points = [Vec3::new(0.1, 0.0, 3.0), Vec3::new(0.1, 0.0, 2.0)];
-        let mutual = found(Matching::Mutual, &points);
-        assert_eq!(mutual.iter().map(|c| c.index).collect::<Vec<_>>(), [1]);
-        assert_eq!(found(Matching::Closest, &points).len(), 2);
-    }
-
-    #[test]
-    fn what_was_far_off_is_found_again_when_it_has_come_near() {
-        let points: Vec<Vec3> =
-            (0..60).map(|i| Vec3::new(f64::from(i % 7), 0.0, f64::from(i) / 3.0)).collect();
-        let normals = vec![Vec3::z(); points.len()];
-        let moving = Moving { points: &points, normals: &normals, rays: &normals, noise: 0.01 };
-        let (map, params) = (plate(), RegisterParams::default());
-        let mut matcher = Matcher::new(moving, &map, &params);
-        for (height, reach) in [(5.0, 6.0), (4.0, 5.0), (-9.0, 3.0), (-8.5, 4.0), (0.0, 2.0)] {
-            let pose = Pose::translation(0.3, 0.0, height);
-            let indices = |matcher: &mut Matcher| -> Vec<usize> {
-                matcher.find(&pose, reach).iter().map(|c| c.index).collect()
-            };
-            let anew = indices(&mut Matcher::new(moving, &map, &params));
-            assert!(!anew.is_empty());
-            assert_eq!(indices(&mut matcher), anew);
-        }
-    }
+/// The normal for which the curvature of the surface between two points cancels, so that the
+/// distance is right to third order (Rusinkiewicz 2019, A Symmetric Objective Function for ICP);
+/// `agreement` is `a . b`.
+fn symmetric_normal(a: &Vec3, b: &Vec3, agreement: f64) -> Vec3 {
+    (a + b) / (1.0 + agreement)
 }

@@ -1,92 +1,70 @@
-//! Stage 3: what each correspondence counts for (Rusinkiewicz & Levoy 2001, §3.3), and the robust kernels that make
-//! large residuals count for less.
+//! Stage 3: what each correspondence counts for (Rusinkiewicz & Levoy 2001, §3.3), and the robust
+//! kernels that make large residuals count for less.
 
-use super::Moving;
+use super::factors::tukey;
 use super::matching::Correspondence;
+use super::source::Source;
 use crate::geometry::{MAD_TO_SIGMA, median};
-use crate::register::factors::tukey;
+use crate::register::params::{Kernel, Weight};
 
-crate::choice! {
-    /// What each correspondence counts for before the robust kernel.
-    pub enum Weight {
-        /// All the same.
-        Constant = "constant",
-        /// 1 - d / d_max for points d apart (Godin, Rioux & Baribeau 1994).
-        Distance = "distance",
-        /// The cosine between the normals (Rusinkiewicz & Levoy 2001).
-        Normals = "normals",
-        /// The inverse variance of a triangulating sensor: its standard deviation grows with the square of the distance
-        /// and with 1 / cos of the angle of incidence (Turk & Levoy 1994; Curless & Levoy 1996).
-        SensorNoise = "sensor_noise",
-        /// One minus the deviation of d from its median, in units of its median absolute deviation scaled to a standard
-        /// deviation and counted to three; beyond, nothing.
-        Mad = "mad",
-    }
-}
-
-crate::choice! {
-    /// What residuals count for beside smaller ones.
-    pub enum Kernel {
-        /// Least squares.
-        None = "none",
-        /// Tukey's biweight: nothing beyond 4.685 standard deviations.
-        Tukey = "tukey",
-        /// Huber's: least squares to 1.345 standard deviations, least absolute deviations beyond.
-        Huber = "huber",
-        /// Cauchy's (Lorentzian), 2.385 standard deviations wide.
-        Cauchy = "cauchy",
-    }
-}
+/// Residuals, in standard deviations, up to which Huber's kernel is least squares.
+const HUBER_WIDTH: f64 = 1.345;
+/// Width of Cauchy's kernel, in standard deviations of a residual.
+const CAUCHY_WIDTH: f64 = 2.385;
+/// Standard deviations at which a weight of [`Weight::Mad`] ends.
+const MAD_MAX_SIGMAS: f64 = 3.0;
 
 impl Kernel {
-    /// Weight of a residual `r` in units of its standard deviation (the influence divided by `r`). The widths keep 95 %
-    /// of the efficiency of least squares under Gaussian noise (Holland & Welsch 1977, table 1).
+    /// Weight of a residual `r` in units of its standard deviation (the influence divided by `r`).
+    /// The widths keep 95 % of the efficiency of least squares under Gaussian noise (Holland &
+    /// Welsch 1977, table 1).
     pub(crate) fn weight(self, r: f64) -> f64 {
-        let within = |width: f64| (r / width).powi(2);
         match self {
             Kernel::None => 1.0,
             Kernel::Tukey => tukey(r),
-            Kernel::Huber => (1.345 / r.abs().max(f64::MIN_POSITIVE)).min(1.0),
-            Kernel::Cauchy => 1.0 / (1.0 + within(2.385)),
+            Kernel::Huber => (HUBER_WIDTH / r.abs().max(f64::MIN_POSITIVE)).min(1.0),
+            Kernel::Cauchy => 1.0 / (1.0 + (r / CAUCHY_WIDTH).powi(2)),
         }
     }
 }
 
-/// Standard deviations at which a weight of [`Weight::Mad`] ends.
-const MAD_WIDTH: f64 = 3.0;
-
 impl Weight {
-    /// The weights of the correspondences `found` of `moving`; those of [`Weight::SensorNoise`] have mean 1.
-    pub(crate) fn of(self, found: &[Correspondence], moving: &Moving) -> Vec<f64> {
-        let each = |f: &dyn Fn(&Correspondence) -> f64| found.iter().map(f).collect::<Vec<f64>>();
+    /// The weights of `pairs` of the points `source`; those of [`Weight::SensorNoise`] have mean 1.
+    pub(crate) fn weigh(self, pairs: &[Correspondence], source: &Source) -> Vec<f64> {
         match self {
-            Weight::Constant => vec![1.0; found.len()],
+            Weight::Constant => vec![1.0; pairs.len()],
             Weight::Distance => {
-                let largest = found.iter().map(|c| c.gap).fold(f64::MIN_POSITIVE, f64::max);
-                each(&|c| 1.0 - c.gap / largest)
+                let largest =
+                    pairs.iter().map(|c| c.point_distance).fold(f64::MIN_POSITIVE, f64::max);
+                pairs.iter().map(|c| 1.0 - c.point_distance / largest).collect()
             }
-            Weight::Normals => each(&|c| c.agreement().max(0.0)),
+            Weight::Normals => pairs.iter().map(|c| c.normal_cos().max(0.0)).collect(),
             Weight::SensorNoise => {
-                let weights = each(&|c| {
-                    let (ray, normal) = (&moving.rays[c.index], &moving.normals[c.index]);
-                    ray.dot(normal).powi(2) / c.point.norm_squared().powi(2).max(f64::MIN_POSITIVE)
-                });
-                let mean = weights.iter().sum::<f64>() / found.len().max(1) as f64;
+                let weights: Vec<f64> = pairs.iter().map(|c| inverse_variance(c, source)).collect();
+                let mean = weights.iter().sum::<f64>() / pairs.len().max(1) as f64;
                 weights.into_iter().map(|w| w / mean.max(f64::MIN_POSITIVE)).collect()
             }
             Weight::Mad => {
-                let middle = median(each(&|c| c.distance)).unwrap_or(0.0);
-                let deviation = median(each(&|c| (c.distance - middle).abs())).unwrap_or(0.0);
-                let width = (MAD_WIDTH * MAD_TO_SIGMA * deviation).max(f64::MIN_POSITIVE);
-                each(&|c| (1.0 - (c.distance - middle).abs() / width).max(0.0))
+                let middle =
+                    median(pairs.iter().map(|c| c.plane_distance).collect()).unwrap_or(0.0);
+                let deviations = pairs.iter().map(|c| (c.plane_distance - middle).abs());
+                let deviation = median(deviations.clone().collect()).unwrap_or(0.0);
+                let width = (MAD_MAX_SIGMAS * MAD_TO_SIGMA * deviation).max(f64::MIN_POSITIVE);
+                deviations.map(|d| (1.0 - d / width).max(0.0)).collect()
             }
         }
     }
+}
+
+/// The inverse variance of a point of a triangulating sensor, up to a factor.
+fn inverse_variance(pair: &Correspondence, source: &Source) -> f64 {
+    let (ray, normal) = (&source.rays[pair.index], &source.normals[pair.index]);
+    ray.dot(normal).powi(2) / pair.point.norm_squared().powi(2).max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::matching::tests::pair;
+    use super::super::matching_tests::pair;
     use super::*;
     use crate::geometry::Vec3;
 
@@ -105,17 +83,18 @@ mod tests {
         assert_eq!(Kernel::None.weight(100.0), 1.0);
     }
 
-    /// Weights of ten pairs 0 to 9 mm apart, the last seen at 60 degrees and turned by 60 degrees from the map's normal.
+    /// Weights of ten pairs 0 to 9 mm apart, the last seen at 60 degrees and turned by 60 degrees
+    /// from the map's normal.
     fn weights(weight: Weight) -> Vec<f64> {
         let mut found: Vec<Correspondence> = (0..10).map(|i| pair(i, i as f64 * 1e-3)).collect();
         let tilted = Vec3::new(0.75_f64.sqrt(), 0.0, 0.5);
-        found[9].here = tilted;
+        found[9].source_normal = tilted;
         let points = vec![-Vec3::z(); 10];
         let mut normals = vec![Vec3::z(); 10];
         normals[9] = tilted;
         let rays = vec![-Vec3::z(); 10];
-        let moving = Moving { points: &points, normals: &normals, rays: &rays, noise: 1e-3 };
-        weight.of(&found, &moving)
+        let source = Source { points: &points, normals: &normals, rays: &rays, noise: 1e-3 };
+        weight.weigh(&found, &source)
     }
 
     #[test]
@@ -135,8 +114,8 @@ mod tests {
         let mut found: Vec<Correspondence> = (0..9).map(|i| pair(i, i as f64 * 1e-3)).collect();
         found.push(pair(9, 0.5));
         let points = [Vec3::z(); 10];
-        let moving = Moving { points: &points, normals: &points, rays: &points, noise: 1e-3 };
-        let weights = Weight::Mad.of(&found, &moving);
+        let source = Source { points: &points, normals: &points, rays: &points, noise: 1e-3 };
+        let weights = Weight::Mad.weigh(&found, &source);
         assert!(weights[4] > 0.9 && weights[5] > 0.9, "{weights:?}");
         assert!(weights[0] < weights[2] && weights[2] < weights[4]);
         assert_eq!(weights[9], 0.0);

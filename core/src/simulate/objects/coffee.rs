@@ -9,9 +9,10 @@ pub(crate) fn coffee(p: &Vec3) -> f64 {
     // Symmetric parts are made once, at positive y.
     let q = Vec3::new(p.x, p.y.abs(), p.z);
     let fold = capsule(&q, [0.0, 47.0, 50.0], [0.0, 46.6, 176.0], 2.2);
-    let tuck = |x: f64| capsule(&q, [x, 46.0, 173.0], [0.0, 20.0, 173.0], 1.5);
+    let [tuck_front, tuck_back] =
+        [34.0, -34.0].map(|x| capsule(&q, [x, 46.0, 173.0], [0.0, 20.0, 173.0], 1.5));
     let seam = capsule(p, [1.0, -40.0, -0.6], [1.0, 40.0, -0.6], 1.4);
-    let folded = [fold, tuck(34.0), tuck(-34.0), seam]
+    let folded = [fold, tuck_front, tuck_back, seam]
         .into_iter()
         .fold(body, |solid, crease| subtract(solid, crease, 1.5));
     union(folded, flap(p), 1.5)
@@ -27,8 +28,11 @@ fn wrinkles(p: &Vec3) -> f64 {
 /// Two plies of the closed top, folded over to one side and tilted a little.
 fn flap(p: &Vec3) -> f64 {
     let (sin, cos) = 0.05f64.sin_cos();
-    let tilt = |q: Vec3| Vec3::new(cos * q.x + sin * q.z, q.y, cos * q.z - sin * q.x);
-    let upper = rounded_box(&tilt(p - Vec3::new(-6.0, 0.0, 175.1)), [15.0, 41.0, 4.2], 1.5);
-    let lower = rounded_box(&tilt(p - Vec3::new(10.0, 1.0, 172.4)), [14.0, 39.0, 2.6], 1.0);
+    let [upper, lower] = [Vec3::new(-6.0, 0.0, 175.1), Vec3::new(10.0, 1.0, 172.4)].map(|center| {
+        let q = p - center;
+        Vec3::new(cos * q.x + sin * q.z, q.y, cos * q.z - sin * q.x)
+    });
+    let upper = rounded_box(&upper, [15.0, 41.0, 4.2], 1.5);
+    let lower = rounded_box(&lower, [14.0, 39.0, 2.6], 1.0);
     union(upper, lower, 1.0)
 }

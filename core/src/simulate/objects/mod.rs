@@ -1,11 +1,11 @@
-//! Ground-truth objects made from signed distances, and the check of foreign ones.
+//! Ground-truth objects made from signed distances, and the check of a user's own objects.
 
-mod basic;
+mod automotive_filter;
 mod coffee;
-mod filter;
+mod machine_parts;
 mod mesher;
 mod sdf;
-mod technical;
+mod solids;
 mod vessels;
 
 use crate::geometry::Vec3;
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 /// What is known of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectInfo {
-    /// The name that [`make`] takes.
+    /// The name that [`make_object`] takes.
     pub name: &'static str,
     /// One line for the user.
     pub description: &'static str,
@@ -38,30 +38,30 @@ struct Recipe {
 /// Spacings give 100,000 to 250,000 triangles (a lattice gives about nine a squared spacing).
 #[rustfmt::skip]
 static RECIPES: [Recipe; 10] = [
-    Recipe { name: "filter", genus: 0, size: [82.0, 80.0, 103.0], spacing: 1.25, field: filter::filter,
+    Recipe { name: "filter", genus: 0, size: [82.0, 80.0, 103.0], spacing: 1.25, field: automotive_filter::filter,
         description: "automotive filter: ribbed body, neck 12 mm thick, small cylinder on top" },
     Recipe { name: "coffee", genus: 0, size: [66.0, 91.0, 180.0], spacing: 1.6, field: coffee::coffee,
         description: "vacuum-packed coffee: wrinkles, side folds, folded top" },
     Recipe { name: "mug", genus: 1, size: [107.5, 80.0, 95.0], spacing: 1.5, field: vessels::mug,
         description: "mug with a 4 mm wall, a deep cavity and a handle" },
-    Recipe { name: "torus", genus: 1, size: [110.0, 110.0, 30.0], spacing: 1.1, field: basic::torus,
+    Recipe { name: "torus", genus: 1, size: [110.0, 110.0, 30.0], spacing: 1.1, field: solids::torus,
         description: "lying ring, 30 mm thick" },
-    Recipe { name: "bracket", genus: 4, size: [100.0, 50.0, 80.0], spacing: 1.0, field: technical::bracket,
+    Recipe { name: "bracket", genus: 4, size: [100.0, 50.0, 80.0], spacing: 1.0, field: machine_parts::bracket,
         description: "L-shaped bracket, 8 mm thick, with a gusset and four through holes" },
     Recipe { name: "open_box", genus: 0, size: [80.0, 60.0, 50.0], spacing: 1.25, field: vessels::open_box,
         description: "open box with walls of 2 mm" },
-    Recipe { name: "phantom", genus: 0, size: [60.0, 60.0, 84.0], spacing: 0.9, field: technical::phantom,
+    Recipe { name: "phantom", genus: 0, size: [60.0, 60.0, 84.0], spacing: 0.9, field: machine_parts::phantom,
         description: "ball and cap joined by a neck 6 mm thick and 10 mm long" },
-    Recipe { name: "gear", genus: 1, size: [80.0, 80.0, 25.0], spacing: 1.0, field: technical::gear,
+    Recipe { name: "gear", genus: 1, size: [80.0, 80.0, 25.0], spacing: 1.0, field: machine_parts::gear,
         description: "gear of 20 teeth with hub, bore and keyway" },
-    Recipe { name: "sphere", genus: 0, size: [100.0, 100.0, 100.0], spacing: 1.3, field: basic::sphere,
+    Recipe { name: "sphere", genus: 0, size: [100.0, 100.0, 100.0], spacing: 1.3, field: solids::sphere,
         description: "ball" },
-    Recipe { name: "box", genus: 0, size: [100.0, 70.0, 50.0], spacing: 1.2, field: basic::cuboid,
+    Recipe { name: "box", genus: 0, size: [100.0, 70.0, 50.0], spacing: 1.2, field: solids::cuboid,
         description: "box with edges rounded to 1.5 mm" },
 ];
 
-/// All objects that [`make`] can make.
-pub fn infos() -> impl Iterator<Item = ObjectInfo> {
+/// All objects that [`make_object`] can make.
+pub fn object_infos() -> impl Iterator<Item = ObjectInfo> {
     RECIPES.iter().map(|recipe| ObjectInfo {
         name: recipe.name,
         description: recipe.description,
@@ -71,20 +71,24 @@ pub fn infos() -> impl Iterator<Item = ObjectInfo> {
 }
 
 /// The names of all objects.
-pub fn names() -> Vec<&'static str> {
+pub fn object_names() -> Vec<&'static str> {
     RECIPES.iter().map(|recipe| recipe.name).collect()
 }
 
-/// Makes the object `name`: a closed, two-manifold, outward-oriented mesh without self-intersections, metres,
-/// z up, standing on z = 0, centred in x and y, with vertex normals. The same mesh each time.
+/// Makes the object `name`: a closed, two-manifold, outward-oriented mesh without
+/// self-intersections, metres, z up, standing on z = 0, centred in x and y, with vertex normals.
+/// The same mesh each time.
 ///
 /// # Errors
 /// [`Error::Input`] if there is no such object; the text lists all names.
-pub fn make(name: &str) -> Result<Mesh> {
+pub fn make_object(name: &str) -> Result<Mesh> {
     let recipe = RECIPES.iter().find(|recipe| recipe.name == name).ok_or_else(|| {
-        Error::input(format!("there is no object \"{name}\"; there are {}", names().join(", ")))
+        Error::input(format!(
+            "there is no object \"{name}\"; there are {}",
+            object_names().join(", ")
+        ))
     })?;
-    let mut mesh = mesher::mesh(recipe.field, recipe.size, recipe.spacing);
+    let mut mesh = mesher::mesh_zero_set(recipe.field, recipe.size, recipe.spacing);
     let aabb = mesh.aabb();
     let foot = Vec3::new(aabb.center().x, aabb.center().y, aabb.min.z);
     for vertex in &mut mesh.vertices {
@@ -94,11 +98,14 @@ pub fn make(name: &str) -> Result<Mesh> {
     Ok(mesh)
 }
 
+/// A larger object is refused, metres: it is most likely in millimetres.
+const MAX_EXTENT: f64 = 10.0;
+
 /// Checks that `mesh` can serve as ground truth.
 ///
 /// # Errors
-/// [`Error::Input`] if it is empty, broken, larger than 10 m, not closed or turned inside out; the text says
-/// how to mend it.
+/// [`Error::Input`] if it is empty, broken, larger than 10 m, not closed or turned inside out; the
+/// text says how to mend it.
 pub fn check_ground_truth(mesh: &Mesh) -> Result<()> {
     if mesh.triangles.is_empty() {
         return Err(Error::input(
@@ -115,12 +122,12 @@ pub fn check_ground_truth(mesh: &Mesh) -> Result<()> {
         return Err(Error::input(format!("vertex {at} of the ground truth is not finite")));
     }
     let extent = mesh.aabb().extent().max();
-    if extent > 10.0 {
+    if extent > MAX_EXTENT {
         return Err(Error::input(format!(
             "the ground truth is {extent:.0} m large; millimetres? use --unit mm"
         )));
     }
-    let open = open_edges(mesh);
+    let open = count_open_edges(mesh);
     if open > 0 {
         return Err(Error::input(format!(
             "the ground truth is not closed: {open} edges lack their counterpart; merge duplicate vertices, \
@@ -136,9 +143,9 @@ pub fn check_ground_truth(mesh: &Mesh) -> Result<()> {
 }
 
 /// Number of directed edges without an opposite one.
-fn open_edges(mesh: &Mesh) -> usize {
-    let edges = |t: &[u32; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-    let mut forward: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(edges).collect();
+fn count_open_edges(mesh: &Mesh) -> usize {
+    let mut forward: Vec<(u32, u32)> =
+        mesh.triangles.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect();
     let mut backward: Vec<(u32, u32)> = forward.iter().map(|&(a, b)| (b, a)).collect();
     forward.sort_unstable();
     backward.sort_unstable();

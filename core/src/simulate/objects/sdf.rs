@@ -1,12 +1,14 @@
 //! Signed distances of simple solids and the ways to blend them (Quilez, "Distance functions"), in
-//! millimetres; negative is inside. Blends bend distances a little, which the mesher's Newton steps undo.
+//! millimetres; negative is inside. Blends bend distances a little, which the mesher's Newton steps
+//! undo.
 
 use crate::geometry::Vec3;
 
 /// A solid as its (nearly) signed distance, millimetres.
 pub(crate) type Field = fn(&Vec3) -> f64;
 
-/// Union with a fillet of about the width `k` where the surfaces meet. Surfaces that coincide bulge by k/4.
+/// Union with a fillet of about the width `k` where the surfaces meet. Surfaces that coincide bulge
+/// by k/4.
 pub(crate) fn union(a: f64, b: f64, k: f64) -> f64 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - h * h * k / 4.0
@@ -28,7 +30,8 @@ pub(crate) fn rounded_box(p: &Vec3, half: [f64; 3], radius: f64) -> f64 {
     q.sup(&Vec3::zeros()).norm() + q.max().min(0.0) - radius
 }
 
-/// The flat shape of signed distance `flat`, extruded over z in `from..to` with edges rounded to `radius`.
+/// The flat shape of signed distance `flat`, extruded over z in `from..to` with edges rounded to
+/// `radius`.
 pub(crate) fn extrude(flat: f64, z: f64, from: f64, to: f64, radius: f64) -> f64 {
     let across = flat + radius;
     let along = (z - (from + to) / 2.0).abs() - (to - from) / 2.0 + radius;

@@ -7,23 +7,25 @@ use rayon::prelude::*;
 fn self_intersections(mesh: &Mesh) -> usize {
     let surface = Surface::new(&mesh.vertices, &mesh.triangles).unwrap();
     // Millimetres keep the volumes of the test well above rounding.
-    let corners = |i: usize| mesh.corners(i).map(|v| v * 1e3);
-    let hit = |&i: &usize| {
-        let mine = corners(i);
-        surface.triangles_near(&Aabb::of(&mesh.corners(i))).into_iter().any(|j| {
-            let shares = mesh.triangles[j as usize].iter().any(|v| mesh.triangles[i].contains(v));
-            let other = corners(j as usize);
-            !shares && (0..3).any(|k| pierces(&other[k], &other[(k + 1) % 3], &mine))
+    (0..mesh.triangles.len())
+        .into_par_iter()
+        .filter(|&i| {
+            let own = mesh.corners(i).map(|v| v * 1e3);
+            surface.triangles_near(&Aabb::from_points(&mesh.corners(i))).into_iter().any(|j| {
+                let other = mesh.triangles[j as usize];
+                let shares_vertex = other.iter().any(|v| mesh.triangles[i].contains(v));
+                let other = mesh.corners(j as usize).map(|v| v * 1e3);
+                !shares_vertex && (0..3).any(|k| pierces(&other[k], &other[(k + 1) % 3], &own))
+            })
         })
-    };
-    (0..mesh.triangles.len()).into_par_iter().filter(hit).count()
+        .count()
 }
 
 #[test]
 fn every_object_is_as_stated() {
-    for info in infos() {
+    for info in object_infos() {
         let start = std::time::Instant::now();
-        let mesh = make(info.name).unwrap();
+        let mesh = make_object(info.name).unwrap();
         let seconds = start.elapsed().as_secs_f64();
         let (name, triangles) = (info.name, mesh.triangles.len());
         let (euler, components) = assert_manifold(&mesh);
@@ -45,14 +47,15 @@ fn every_object_is_as_stated() {
 }
 
 fn smallest_angle(c: &[Vec3; 3]) -> f64 {
-    let angle = |i: usize| (c[(i + 1) % 3] - c[i]).angle(&(c[(i + 2) % 3] - c[i])).to_degrees();
-    (0..3).map(angle).fold(180.0, f64::min)
+    (0..3)
+        .map(|i| (c[(i + 1) % 3] - c[i]).angle(&(c[(i + 2) % 3] - c[i])).to_degrees())
+        .fold(180.0, f64::min)
 }
 
 #[test]
 fn vertices_lie_on_the_zero_set() {
     for recipe in &RECIPES {
-        let mesh = mesher::mesh(recipe.field, recipe.size, recipe.spacing);
+        let mesh = mesher::mesh_zero_set(recipe.field, recipe.size, recipe.spacing);
         let off: Vec<f64> = mesh.vertices.iter().map(|v| (recipe.field)(v).abs()).collect();
         let beyond = off.iter().filter(|&&d| d > 1e-3).count();
         let worst = off.iter().copied().fold(0.0, f64::max);
@@ -63,13 +66,13 @@ fn vertices_lie_on_the_zero_set() {
 
 #[test]
 fn an_unknown_name_lists_the_known_ones() {
-    let error = make("teapot").unwrap_err().to_string();
+    let error = make_object("teapot").unwrap_err().to_string();
     assert!(error.contains("teapot") && error.contains("coffee"), "{error}");
 }
 
 #[test]
 fn unfit_ground_truth_is_refused_with_the_cure() {
-    let good = make("box").unwrap();
+    let good = make_object("box").unwrap();
     type Spoil = fn(&mut Mesh);
     let cases: [(Spoil, &str); 5] = [
         (|m| m.triangles.clear(), "no triangles"),

@@ -1,6 +1,6 @@
 //! `puffer evaluate`: a mesh against the truth.
 
-use crate::progress::Watch;
+use crate::progress::TerminalProgress;
 use crate::table::print_rows;
 use anyhow::Result;
 use clap::Args;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Gates, distances both ways (mm), triangle quality and calibration.
 #[derive(Args)]
-pub struct Evaluate {
+pub struct EvaluateCommand {
     /// Mesh to measure
     mesh: PathBuf,
     /// True mesh, in the same frame
@@ -31,7 +31,7 @@ pub struct Evaluate {
     json: bool,
 }
 
-impl Evaluate {
+impl EvaluateCommand {
     pub(super) fn run(&self) -> Result<()> {
         let (mesh, truth) = (read_mesh(&self.mesh)?, read_mesh(&self.truth)?);
         let seen = self.seen.as_deref().map(read_cloud).transpose()?.map(|cloud| cloud.points);
@@ -41,15 +41,15 @@ impl Evaluate {
             seen,
             ..AssessParams::default()
         };
-        let watch = Watch::start();
+        let watch = TerminalProgress::start();
         let assessment = assess(&mesh, &truth, &params, watch.progress())?;
         watch.finish();
         print(&assessment, self.json)
     }
 }
 
-/// Rows that stand first and together: how far the mesh lies off the truth says little of a mesh that
-/// leaves out most of the object, so completeness stands beside it.
+/// Rows that are printed first: the distance from the mesh to the truth says little of a mesh that
+/// leaves out most of the object, so completeness is printed beside it.
 const FIRST_ROWS: [&str; 3] = ["crms_rms", "accuracy_rms", "completeness_rms"];
 
 fn print(assessment: &Assessment, json: bool) -> Result<()> {

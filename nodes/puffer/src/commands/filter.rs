@@ -1,22 +1,24 @@
 //! `puffer filter`: one cloud with uncertainty.
 
-use super::input::{InputArgs, Job, check_output};
+use super::input::{InputArgs, OpenedInput, check_output};
 use crate::parameters::ParameterArgs;
-use crate::progress::Watch;
-use crate::table::Report;
-use crate::verdict;
+use crate::progress::TerminalProgress;
+use crate::table::ResultTable;
+use crate::verdict_report;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::mesh::io::write_cloud;
-use puffer_core::pipeline::{Input, Params, Poses, filter_scans, prepare, register_scans};
-use puffer_core::register::PreparedScan;
+use puffer_core::pipeline::{
+    PipelineInput, PipelineParams, PoseSource, filter_scans, prepare_scans, register_scans,
+};
+use puffer_core::scan::PreparedScan;
 use puffer_core::verdict::{ModelVerdict, ScanCount};
 use puffer_core::{Progress, filter, geometry};
 use std::path::PathBuf;
 
 /// Combines redundant measurements and drops outliers.
 #[derive(Args)]
-pub struct Filter {
+pub struct FilterCommand {
     #[command(flatten)]
     input: InputArgs,
     /// Cloud to write, .ply
@@ -29,21 +31,25 @@ pub struct Filter {
     json: bool,
 }
 
-impl Filter {
+impl FilterCommand {
     pub(super) fn run(&self) -> Result<()> {
         check_output(&self.output, &["ply"])?;
-        let watch = Watch::start();
-        let Job { data: input, params, .. } =
+        let watch = TerminalProgress::start();
+        let OpenedInput { data: input, params, .. } =
             self.input.open(&self.parameters, watch.progress())?;
-        let (filtered, scans) =
-            self.input.named(filtered(&input, self.input.poses(), &params, watch.progress()))?;
+        let (filtered, scans) = self.input.with_input_name(filter_input(
+            &input,
+            self.input.poses(),
+            &params,
+            watch.progress(),
+        ))?;
         watch.finish();
         write_cloud(
             &self.output,
             &filtered.cloud,
             &[format!("puffer {}", env!("CARGO_PKG_VERSION"))],
         )?;
-        let mut report = Report::default();
+        let mut report = ResultTable::default();
         let points = filtered.cloud.len();
         report.add("points", format!("{points} of {}", filtered.measurements), "points", points);
         report.add_value("measurements", filtered.measurements);
@@ -55,7 +61,7 @@ impl Filter {
         }
         let on_the_whole = ModelVerdict { scans, cells_explained: None };
         if scans.is_some() {
-            verdict::add(&mut report, &on_the_whole);
+            verdict_report::add_verdict(&mut report, &on_the_whole);
         }
         report.add(
             "written",
@@ -65,28 +71,28 @@ impl Filter {
         );
         report.print(self.json);
         // The cloud is what was asked for: nothing is held back.
-        verdict::pass(&on_the_whole, true, "")
+        verdict_report::ensure_trustworthy(&on_the_whole, true, "")
     }
 }
 
 /// The cloud, and how many scans it was made of.
-fn filtered(
-    input: &Input,
-    poses: Poses,
-    params: &Params,
+fn filter_input(
+    input: &PipelineInput,
+    poses: PoseSource,
+    params: &PipelineParams,
     progress: &Progress,
 ) -> puffer_core::Result<(filter::Filtered, Option<ScanCount>)> {
     match input {
-        Input::Scans(files) => {
-            let prepared = prepare(files, progress)?;
+        PipelineInput::Scans(files) => {
+            let prepared = prepare_scans(files, progress)?;
             let registration = register_scans(&prepared, poses, &params.register, progress)?;
             let filtered = filter_scans(&prepared, &registration, &params.filter, progress)?;
             Ok((filtered, ScanCount::from_verdicts(&registration.verdicts)))
         }
-        Input::Cloud(cloud) => {
-            let scan = PreparedScan::of_cloud(cloud)?;
+        PipelineInput::Cloud(cloud) => {
+            let scan = PreparedScan::from_cloud(cloud)?;
             let scans = [(&scan, geometry::Pose::identity())];
-            Ok((filter::filter(&scans, f64::NAN, &params.filter, progress)?, None))
+            Ok((filter::filter(&scans, None, &params.filter, progress)?, None))
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Arguments that several commands share.
 
-use super::bag::Notes;
-use crate::failure::usage;
+use crate::exit_status::usage_error;
+use crate::notes::BagNotes;
 use crate::parameters::ParameterArgs;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -9,11 +9,11 @@ use puffer_core::Error;
 use puffer_core::Progress;
 use puffer_core::filter::FilterParams;
 use puffer_core::mesh::io::Unit;
-use puffer_core::pipeline::{Input, Params, Poses};
+use puffer_core::pipeline::{PipelineInput, PipelineParams, PoseSource};
 use puffer_core::reconstruct::ReconstructParams;
 use puffer_core::register::RegisterParams;
-use puffer_core::scans::ScanSource;
-use puffer_shell::scans::{RegistrarParams, ScanParams, is_bag, scans_of_bag};
+use puffer_core::scan_files::ScanSource;
+use puffer_ros::scans::{RegistrarParams, ScanParams, is_bag, scans_of_bag};
 use std::path::{Path, PathBuf};
 
 /// The data to work on.
@@ -61,13 +61,13 @@ puffer_core::param_groups! {
 }
 
 impl BagParams {
-    pub(crate) fn of_registrar(&self) -> RegistrarParams {
+    pub(crate) fn registrar_params(&self) -> RegistrarParams {
         RegistrarParams { scan: self.scan.clone(), register: self.register.clone() }
     }
 }
 
 /// Defaults, overridden by what the run had that made the bag, overridden by the user.
-pub(crate) fn bag_params(notes: &Notes, parameters: &ParameterArgs) -> Result<BagParams> {
+pub(crate) fn bag_params(notes: &BagNotes, parameters: &ParameterArgs) -> Result<BagParams> {
     let mut params = BagParams::default();
     notes.apply(&mut params, "scan_registrar", &["scan", "register"])?;
     notes.apply(&mut params, "cloud_filter", &["filter"])?;
@@ -76,9 +76,9 @@ pub(crate) fn bag_params(notes: &Notes, parameters: &ParameterArgs) -> Result<Ba
 }
 
 /// The data, and how it is worked on.
-pub(crate) struct Job<T> {
+pub(crate) struct OpenedInput<T> {
     pub data: T,
-    pub params: Params,
+    pub params: PipelineParams,
     /// Seed of the run that a bag came from.
     pub seed: Option<u64>,
 }
@@ -89,28 +89,32 @@ impl InputArgs {
         &self,
         parameters: &ParameterArgs,
         progress: &Progress,
-    ) -> Result<Job<Input>> {
+    ) -> Result<OpenedInput<PipelineInput>> {
         if is_bag(&self.path) {
             return self.open_bag(parameters, progress);
         }
         let params = parameters.load()?;
-        Ok(Job { data: Input::open(&self.path, self.unit())?, params, seed: None })
+        Ok(OpenedInput { data: PipelineInput::open(&self.path, self.unit())?, params, seed: None })
     }
 
-    fn open_bag(&self, parameters: &ParameterArgs, progress: &Progress) -> Result<Job<Input>> {
-        if self.unit() != Unit::M {
-            return Err(usage(format!(
+    fn open_bag(
+        &self,
+        parameters: &ParameterArgs,
+        progress: &Progress,
+    ) -> Result<OpenedInput<PipelineInput>> {
+        if self.unit() != Unit::Metre {
+            return Err(usage_error(format!(
                 "{}: a bag's clouds are in metres; leave --unit out",
                 self.path.display()
             )));
         }
-        let notes = Notes::read(&self.path)?;
+        let notes = BagNotes::read(&self.path)?;
         let params = bag_params(&notes, parameters)?;
-        let scans = scans_of_bag(&self.path, &params.of_registrar(), progress)?;
+        let scans = scans_of_bag(&self.path, &params.registrar_params(), progress)?;
         let seed = notes.get("mesh_reconstructor", "mesh", "seed").and_then(|v| v.as_u64());
         let BagParams { register, filter, reconstruct, .. } = params;
-        let params = Params { register, filter, reconstruct };
-        Ok(Job { data: Input::Scans(ScanSource::of(scans)), params, seed })
+        let params = PipelineParams { register, filter, reconstruct };
+        Ok(OpenedInput { data: PipelineInput::Scans(ScanSource::from_set(scans)), params, seed })
     }
 
     /// Opens the data, which must be scans.
@@ -118,19 +122,19 @@ impl InputArgs {
         &self,
         parameters: &ParameterArgs,
         progress: &Progress,
-    ) -> Result<Job<ScanSource>> {
-        let Job { data, params, seed } = self.open(parameters, progress)?;
+    ) -> Result<OpenedInput<ScanSource>> {
+        let OpenedInput { data, params, seed } = self.open(parameters, progress)?;
         match data {
-            Input::Scans(data) => Ok(Job { data, params, seed }),
-            Input::Cloud(_) => Err(usage(format!(
+            PipelineInput::Scans(data) => Ok(OpenedInput { data, params, seed }),
+            PipelineInput::Cloud(_) => Err(usage_error(format!(
                 "{} is a single cloud: there is nothing to register; give a scan folder or a .conf",
                 self.path.display()
             ))),
         }
     }
 
-    /// Puts the input's name before an error that tells no file of its own.
-    pub(crate) fn named<T>(&self, result: puffer_core::Result<T>) -> Result<T> {
+    /// Puts the input's name before an error that names no file itself.
+    pub(crate) fn with_input_name<T>(&self, result: puffer_core::Result<T>) -> Result<T> {
         result.map_err(|error| match error {
             Error::Input(_) => anyhow::Error::new(error).context(self.path.display().to_string()),
             other => other.into(),
@@ -139,15 +143,15 @@ impl InputArgs {
 
     pub(crate) fn unit(&self) -> Unit {
         match self.unit {
-            UnitArg::M => Unit::M,
-            UnitArg::Mm => Unit::Mm,
+            UnitArg::M => Unit::Metre,
+            UnitArg::Mm => Unit::Millimetre,
         }
     }
 
-    pub(crate) fn poses(&self) -> Poses {
+    pub(crate) fn poses(&self) -> PoseSource {
         match self.poses {
-            PosesArg::Robot => Poses::Robot,
-            PosesArg::Exact => Poses::Exact,
+            PosesArg::Robot => PoseSource::Robot,
+            PosesArg::Exact => PoseSource::Exact,
         }
     }
 }
@@ -156,7 +160,7 @@ impl InputArgs {
 pub(crate) fn check_output(path: &Path, extensions: &[&str]) -> Result<()> {
     let given = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if !extensions.contains(&given.as_str()) {
-        return Err(usage(format!(
+        return Err(usage_error(format!(
             "{}: the name must end in .{}",
             path.display(),
             extensions.join(", .")
@@ -164,7 +168,11 @@ pub(crate) fn check_output(path: &Path, extensions: &[&str]) -> Result<()> {
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|f| !f.is_dir()) {
-        return Err(usage(format!("{}: there is no folder {}", path.display(), folder.display())));
+        return Err(usage_error(format!(
+            "{}: there is no folder {}",
+            path.display(),
+            folder.display()
+        )));
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ mod params;
 mod reconstruct;
 mod register;
 mod render;
-mod simulate;
+pub mod simulate;
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -24,33 +24,34 @@ use std::process::ExitCode;
 #[derive(Subcommand)]
 pub enum Command {
     /// Model an object from the first view to the mesh, with a simulated robot
-    Model(model::Model),
+    Model(model::ModelCommand),
     /// Start the nodes, for play or for a real robot
-    Launch(launch::Launch),
+    Launch(launch::LaunchCommand),
     /// Run one node
-    Node(node::Node),
+    Node(node::NodeCommand),
     /// Make a watertight mesh from scans
-    Reconstruct(reconstruct::Reconstruct),
+    Reconstruct(reconstruct::ReconstructCommand),
     /// Correct the poses of scans
-    Register(register::Register),
+    Register(register::RegisterCommand),
     /// Combine scans to one cloud with uncertainty
-    Filter(filter::Filter),
+    Filter(filter::FilterCommand),
     /// Scan an object with a simulated robot and sensor
-    Simulate(simulate::Simulate),
+    Simulate(simulate::SimulateCommand),
     /// Measure a mesh against the truth
-    Evaluate(evaluate::Evaluate),
+    Evaluate(evaluate::EvaluateCommand),
     /// Draw a mesh
-    Render(render::Render),
+    Render(render::RenderCommand),
     /// List the objects that can be simulated
-    Objects(objects::Objects),
+    Objects(objects::ObjectsCommand),
     /// List the parameters with their defaults, ranges and units
-    Params(params::Params),
+    Params(params::ParamsCommand),
     /// Record, play and look into bags
-    Bag(bag::Bag),
-    /// Measure a part on this machine
+    Bag(bag::BagCommand),
+    /// The program `puffer-bench` by its former name
+    #[command(hide = true)]
     Bench(bench::Bench),
     /// Check this machine
-    Doctor(doctor::Doctor),
+    Doctor(doctor::DoctorCommand),
 }
 
 impl Command {

@@ -1,15 +1,16 @@
 //! `puffer model`: models an object from the first view to the mesh, over DDS.
 
-use crate::run::{Plan, Run};
-use crate::setups;
+use crate::modelling_run::{ModellingRun, RunConfig};
+use crate::setups::{self, Setting};
 use anyhow::Result;
 use clap::Args;
+use serde_json::Value;
 use std::path::PathBuf;
 
-/// Starts the simulated robot and every node as processes of their own, models an object, and writes the run folder:
-/// mesh, scans, bag, report, pictures.
+/// Starts the simulated robot and every node as processes of their own, models an object, and
+/// writes the run folder: mesh, scans, bag, report, pictures.
 #[derive(Args)]
-pub struct Model {
+pub struct ModelCommand {
     /// Set-up: kr16_laser or omnirob_stereo
     #[arg(long, default_value = "kr16_laser")]
     setup: String,
@@ -43,8 +44,8 @@ pub struct Model {
     /// Record no bag
     #[arg(long)]
     no_bag: bool,
-    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of the
-    /// measured surface is explained by it
+    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of
+    /// the measured surface is explained by it
     #[arg(long)]
     force: bool,
     /// Print one JSON object instead of a table
@@ -52,29 +53,11 @@ pub struct Model {
     json: bool,
 }
 
-impl Model {
+impl ModelCommand {
     pub(super) fn run(&self) -> Result<()> {
-        let mut settings = setups::of(&self.setup)?;
-        let mut set = |node, name: &'static str, value: serde_json::Value| {
-            settings.push(setups::Setting { node, name: name.into(), value });
-        };
-        set("mock_driver", "driver.object", self.object.as_str().into());
-        set("mock_driver", "driver.seed", self.seed.into());
-        set("mesh_reconstructor", "mesh.seed", self.seed.into());
-        if let Some(speed_up) = self.speed_up {
-            set("mock_driver", "driver.speed_up", speed_up.into());
-        }
-        if let Some(scans) = self.max_scans {
-            set("modeller", "session.max_scans", scans.into());
-        }
-        if let Some(coverage) = self.coverage {
-            set("modeller", "session.coverage", coverage.into());
-        }
-        settings.extend(
-            self.settings.iter().map(|text| setups::parse(text)).collect::<Result<Vec<_>>>()?,
-        );
-        setups::check(&settings)?;
-        let plan = Plan {
+        let settings = self.all_settings()?;
+        setups::check_settings(&settings)?;
+        let config = RunConfig {
             setup: self.setup.clone(),
             object: self.object.clone(),
             out: self.out.clone(),
@@ -84,6 +67,26 @@ impl Model {
             bag: !self.no_bag,
             force: self.force,
         };
-        Run::new(plan)?.model(self.json)
+        ModellingRun::new(config)?.model(self.json)
+    }
+
+    /// Those of the set-up, overridden by the options, overridden by `--set`.
+    fn all_settings(&self) -> Result<Vec<Setting>> {
+        let options: [(&str, &str, Option<Value>); 6] = [
+            ("mock_driver", "driver.object", Some(self.object.as_str().into())),
+            ("mock_driver", "driver.seed", Some(self.seed.into())),
+            ("mesh_reconstructor", "mesh.seed", Some(self.seed.into())),
+            ("mock_driver", "driver.speed_up", self.speed_up.map(Value::from)),
+            ("modeller", "session.max_scans", self.max_scans.map(Value::from)),
+            ("modeller", "session.coverage", self.coverage.map(Value::from)),
+        ];
+        let mut settings = setups::setup_settings(&self.setup)?;
+        settings.extend(options.into_iter().filter_map(|(node, name, value)| {
+            Some(Setting { node, name: name.into(), value: value? })
+        }));
+        for text in &self.settings {
+            settings.push(setups::parse_setting(text)?);
+        }
+        Ok(settings)
     }
 }

@@ -1,16 +1,16 @@
 //! `puffer node`: this program as one of the nodes.
 
-use crate::failure::usage;
-use crate::nodes::{NODES, find};
+use crate::exit_status::usage_error;
+use crate::nodes::{NODES, find_node};
 use anyhow::Result;
 use clap::Args;
-use puffer_shell::{RosArgs, Stop};
+use puffer_ros::{RosArgs, Stop};
 use std::io::Read;
 use std::process::ExitCode;
 
 /// Runs one node, as its own program does.
 #[derive(Args)]
-pub struct Node {
+pub struct NodeCommand {
     /// End when standard input is closed
     #[arg(long, hide = true)]
     with_parent: bool,
@@ -22,11 +22,11 @@ pub struct Node {
     args: Vec<String>,
 }
 
-impl Node {
+impl NodeCommand {
     pub(super) fn run(&self) -> Result<ExitCode> {
-        let Some(node) = find(&self.name) else {
+        let Some(node) = find_node(&self.name) else {
             let names: Vec<&str> = NODES.iter().map(|kind| kind.name).collect();
-            return Err(usage(format!(
+            return Err(usage_error(format!(
                 "there is no node {}; there are {}",
                 self.name,
                 names.join(", ")
@@ -34,16 +34,16 @@ impl Node {
         };
         let run = async |args: RosArgs, stop: Stop| {
             if self.with_parent {
-                end_with_input(stop.clone());
+                stop_with_input(stop.clone());
             }
             (node.run)(args, stop).await
         };
-        Ok(puffer_shell::main_with(self.args.iter().cloned(), run))
+        Ok(puffer_ros::main_with(self.args.iter().cloned(), run))
     }
 }
 
 /// Stops the node when standard input comes to its end: whoever started it is gone.
-fn end_with_input(stop: Stop) {
+fn stop_with_input(stop: Stop) {
     // A thread of its own: nothing waits for a read that never ends.
     std::thread::spawn(move || {
         let mut bytes = [0; 64];

@@ -3,31 +3,34 @@
 use crate::table::print_rows;
 use anyhow::Result;
 use clap::Args;
-use puffer_core::simulate::objects::{ObjectInfo, infos};
+use puffer_core::simulate::objects::{ObjectInfo, object_infos};
 use serde_json::{Value, json};
 
 /// Name, size and genus of each built-in object.
 #[derive(Args)]
-pub struct Objects {
+pub struct ObjectsCommand {
     /// Print a JSON list
     #[arg(long)]
     json: bool,
 }
 
-impl Objects {
+impl ObjectsCommand {
     pub(super) fn run(&self) -> Result<()> {
         if self.json {
-            println!("{}", Value::from(infos().map(|o| as_json(&o)).collect::<Vec<_>>()));
+            println!("{}", Value::from(object_infos().map(|o| as_json(&o)).collect::<Vec<_>>()));
         } else {
-            let row = |o: ObjectInfo| {
-                let [x, y, z] = o.size.map(|s| s * 1e3);
-                let size = format!("{x:.0} x {y:.0} x {z:.0} mm");
-                (o.name.to_owned(), format!("{size:<20}  genus {}  {}", o.genus, o.description))
-            };
-            print_rows(&infos().map(row).collect::<Vec<_>>());
+            print_rows(&object_infos().map(|object| object_row(&object)).collect::<Vec<_>>());
         }
         Ok(())
     }
+}
+
+/// Name and description, as a row of the table.
+fn object_row(object: &ObjectInfo) -> (String, String) {
+    let [x, y, z] = object.size.map(|edge| edge * 1e3);
+    let size = format!("{x:.0} x {y:.0} x {z:.0} mm");
+    let text = format!("{size:<20}  genus {}  {}", object.genus, object.description);
+    (object.name.to_owned(), text)
 }
 
 fn as_json(object: &ObjectInfo) -> Value {

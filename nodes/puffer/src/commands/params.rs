@@ -1,8 +1,8 @@
 //! `puffer params`: the parameter reference.
 
-use crate::failure::usage;
+use crate::exit_status::usage_error;
 use crate::nodes::{NODES, NodeKind};
-use crate::setups::{self, Setting, describe, parameter_file, value_of};
+use crate::setups::{self, Setting, describe_parameter, parameter_file, value_of};
 use crate::table::{print_rows, print_text};
 use anyhow::Result;
 use clap::Args;
@@ -10,17 +10,18 @@ use puffer_core::params::{ParamSpec, Parameters};
 use puffer_core::pipeline;
 use serde_json::{Value, json};
 
-/// Default, range, unit and meaning of each parameter: those of the stages, which `puffer reconstruct` and its like
-/// take with --params and --set, and those of the nodes.
+/// Default, range, unit and meaning of each parameter: those of the stages, which `puffer
+/// reconstruct` and its like take with --params and --set, and those of the nodes.
 #[derive(Args)]
-pub struct Params {
+pub struct ParamsCommand {
     /// Only the parameters of this stage (register, filter, reconstruct) or node
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
     /// The nodes' values in this set-up instead of the defaults
     #[arg(long, value_name = "NAME")]
     setup: Option<String>,
-    /// Print a YAML file with all values: for --params of the stages; with --setup or a node, a ROS parameter file
+    /// Print a YAML file with all values: for --params of the stages; with --setup or a node, a ROS
+    /// parameter file
     #[arg(long)]
     yaml: bool,
     /// Print a JSON list
@@ -29,14 +30,14 @@ pub struct Params {
 }
 
 /// What is listed.
-struct Listed {
+struct ParameterList {
     /// The stages' parameters.
     stages: Vec<ParamSpec>,
     nodes: Vec<&'static NodeKind>,
     settings: Vec<Setting>,
 }
 
-impl Params {
+impl ParamsCommand {
     pub(super) fn run(&self) -> Result<()> {
         let listed = self.listed()?;
         if self.yaml {
@@ -49,35 +50,35 @@ impl Params {
         Ok(())
     }
 
-    fn listed(&self) -> Result<Listed> {
+    fn listed(&self) -> Result<ParameterList> {
         let settings = match &self.setup {
-            Some(setup) => setups::of(setup)?,
+            Some(setup) => setups::setup_settings(setup)?,
             None => Vec::new(),
         };
-        let mut stages = pipeline::Params::all_specs();
+        let mut stages = pipeline::PipelineParams::all_specs();
         let mut nodes: Vec<&NodeKind> = NODES.iter().collect();
         if let Some(name) = &self.node {
-            let mut known: Vec<String> = stages.iter().map(|s| group(s).to_owned()).collect();
+            let mut known: Vec<String> = stages.iter().map(|s| group_of(s).to_owned()).collect();
             known.dedup();
             known.extend(nodes.iter().map(|kind| kind.name.to_owned()));
-            stages.retain(|spec| group(spec) == name);
+            stages.retain(|spec| group_of(spec) == name);
             nodes.retain(|kind| kind.name == name);
             if stages.is_empty() && nodes.is_empty() {
-                return Err(usage(format!("--node {name}: there is {}", known.join(", "))));
+                return Err(usage_error(format!("--node {name}: there is {}", known.join(", "))));
             }
         }
         if self.setup.is_some() {
             stages.clear();
             if nodes.is_empty() {
-                return Err(usage("--setup is about nodes, and --node names a stage"));
+                return Err(usage_error("--setup is about nodes, and --node names a stage"));
             }
         }
-        Ok(Listed { stages, nodes, settings })
+        Ok(ParameterList { stages, nodes, settings })
     }
 
-    fn as_yaml(&self, listed: &Listed) -> String {
+    fn as_yaml(&self, listed: &ParameterList) -> String {
         if !listed.stages.is_empty() {
-            return yaml(&listed.stages);
+            return defaults_yaml(&listed.stages);
         }
         let call: String = [("--setup", &self.setup), ("--node", &self.node)]
             .iter()
@@ -91,15 +92,18 @@ impl Params {
     }
 }
 
-impl Listed {
+impl ParameterList {
     fn print(&self) {
-        print_rows(&self.stages.iter().map(|spec| row(spec, &spec.default)).collect::<Vec<_>>());
+        print_rows(
+            &self.stages.iter().map(|spec| parameter_row(spec, &spec.default)).collect::<Vec<_>>(),
+        );
         let mut first = self.stages.is_empty();
         for kind in &self.nodes {
             print_text(&format!("{}{}\n", if first { "" } else { "\n" }, kind.name));
             first = false;
             let specs = (kind.specs)();
-            let rows = specs.iter().map(|s| row(s, value_of(s, kind.name, &self.settings)));
+            let rows =
+                specs.iter().map(|s| parameter_row(s, value_of(s, kind.name, &self.settings)));
             print_rows(&rows.collect::<Vec<_>>());
         }
     }
@@ -117,25 +121,25 @@ impl Listed {
     }
 }
 
-fn row(spec: &ParamSpec, value: &Value) -> (String, String) {
-    (spec.name.clone(), format!("{:<16}  {}", value.to_string(), describe(spec)))
+fn parameter_row(spec: &ParamSpec, value: &Value) -> (String, String) {
+    (spec.name.clone(), format!("{:<16}  {}", value.to_string(), describe_parameter(spec)))
 }
 
-fn group(spec: &ParamSpec) -> &str {
+fn group_of(spec: &ParamSpec) -> &str {
     spec.name.split('.').next().unwrap_or_default()
 }
 
 /// All defaults with their descriptions as comments.
-fn yaml(specs: &[ParamSpec]) -> String {
+fn defaults_yaml(specs: &[ParamSpec]) -> String {
     let mut text = String::new();
     let mut current = "";
     for spec in specs {
-        if group(spec) != current {
-            current = group(spec);
+        if group_of(spec) != current {
+            current = group_of(spec);
             text += &format!("{current}:\n");
         }
         let field = spec.name.rsplit('.').next().unwrap_or_default();
-        text += &format!("  # {}\n  {field}: {}\n", describe(spec), spec.default);
+        text += &format!("  # {}\n  {field}: {}\n", describe_parameter(spec), spec.default);
     }
     text
 }

@@ -1,22 +1,21 @@
 //! `puffer reconstruct`: from scans to a watertight mesh.
 
-use super::input::{InputArgs, Job, check_output};
+use super::input::{InputArgs, OpenedInput, check_output};
 use crate::parameters::ParameterArgs;
-use crate::progress::Watch;
-use crate::table::Report;
-use crate::verdict;
+use crate::progress::TerminalProgress;
+use crate::table::{ResultTable, yes_or_no};
+use crate::verdict_report;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::mesh::io::write_mesh;
 use puffer_core::mesh::{Mesh, components, genus, is_closed, is_oriented, is_two_manifold};
-use puffer_core::pipeline::{Outcome, comments, run};
-use puffer_core::register::Status;
+use puffer_core::pipeline::{PipelineOutcome, mesh_comments, run};
 use std::path::PathBuf;
 use std::time::Duration;
 
 /// Registers, filters, inflates and details; every parameter is taken from the data unless given.
 #[derive(Args)]
-pub struct Reconstruct {
+pub struct ReconstructCommand {
     #[command(flatten)]
     input: InputArgs,
     /// Mesh to write: .ply (with uncertainty), .stl, .obj or .glb
@@ -27,8 +26,8 @@ pub struct Reconstruct {
     /// Seed for whatever is left to chance [default: that of the run that a bag came from, or 0]
     #[arg(long)]
     seed: Option<u64>,
-    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of the
-    /// measured surface is explained by it
+    /// Write the mesh also where fewer than half of the scans are accepted, or less than half of
+    /// the measured surface is explained by it
     #[arg(long)]
     force: bool,
     /// Print one JSON object instead of a table
@@ -36,26 +35,36 @@ pub struct Reconstruct {
     json: bool,
 }
 
-impl Reconstruct {
+impl ReconstructCommand {
     pub(super) fn run(&self) -> Result<()> {
         check_output(&self.output, &["ply", "stl", "obj", "glb"])?;
-        let watch = Watch::start();
-        let Job { data, params, seed } = self.input.open(&self.parameters, watch.progress())?;
-        let outcome =
-            self.input.named(run(&data, self.input.poses(), &params, watch.progress()))?;
+        let watch = TerminalProgress::start();
+        let OpenedInput { data, params, seed } =
+            self.input.open(&self.parameters, watch.progress())?;
+        let outcome = self.input.with_input_name(run(
+            &data,
+            self.input.poses(),
+            &params,
+            watch.progress(),
+        ))?;
         let times = watch.finish();
         let how = "call again with --force to have it all the same";
-        let passed = verdict::pass(&outcome.verdict, self.force, how);
+        let passed = verdict_report::ensure_trustworthy(&outcome.verdict, self.force, how);
         if passed.is_ok() {
-            let comments = comments(&outcome.cloud, self.seed.or(seed).unwrap_or(0));
+            let comments = mesh_comments(&outcome.cloud, self.seed.or(seed).unwrap_or(0));
             write_mesh(&self.output, &outcome.mesh, &comments)?;
         }
         self.report(&outcome, &times, passed.is_ok()).print(self.json);
         passed
     }
 
-    fn report(&self, outcome: &Outcome, times: &[(String, Duration)], written: bool) -> Report {
-        let mut report = Report::default();
+    fn report(
+        &self,
+        outcome: &PipelineOutcome,
+        times: &[(String, Duration)],
+        written: bool,
+    ) -> ResultTable {
+        let mut report = ResultTable::default();
         registration_rows(&mut report, outcome);
         let points = outcome.cloud.len();
         let text = format!("{points} points from {} measurements", outcome.measurements);
@@ -72,35 +81,35 @@ impl Reconstruct {
         }
         report.add("time", format!("{total:.1} s ({})", parts.join(", ")), "seconds", total);
         report.add_value("stage_seconds", json);
-        if let Some(peak) = peak_memory() {
+        if let Some(peak) = peak_memory_bytes() {
             report.add("peak memory", format!("{:.2} GB", peak / 1e9), "peak_memory_bytes", peak);
         }
         let path = written.then(|| self.output.display().to_string());
         let text = path.as_deref().unwrap_or("no mesh");
         report.add("written", text, "mesh", path.clone());
-        verdict::add(&mut report, &outcome.verdict);
+        verdict_report::add_verdict(&mut report, &outcome.verdict);
         report
     }
 }
 
-fn registration_rows(report: &mut Report, outcome: &Outcome) {
+fn registration_rows(report: &mut ResultTable, outcome: &PipelineOutcome) {
     let Some(registration) = &outcome.registration else { return };
     let total = registration.verdicts.len();
-    let accepted = registration.verdicts.iter().filter(|v| v.status == Status::Accepted).count();
+    let accepted = registration.verdicts.iter().filter(|v| v.is_accepted()).count();
     report.add("scans", format!("{accepted} of {total} accepted"), "accepted_scans", accepted);
     for (name, verdict) in outcome.names.iter().zip(&registration.verdicts) {
-        if verdict.status != Status::Accepted {
+        if !verdict.is_accepted() {
             eprintln!("puffer: {name} {}: {}", verdict.status.word(), verdict.reason);
         }
     }
-    if registration.residual.is_finite() {
-        let millimetres = registration.residual * 1e3;
+    if let Some(residual) = registration.residual {
+        let millimetres = residual * 1e3;
         let text = format!("{millimetres:.3} mm between overlapping scans");
         report.add("registration", text, "registration_residual_mm", millimetres);
     }
 }
 
-fn mesh_rows(report: &mut Report, mesh: &Mesh) {
+fn mesh_rows(report: &mut ResultTable, mesh: &Mesh) {
     let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
     report.add("mesh", format!("{vertices} vertices, {triangles} triangles"), "vertices", vertices);
     report.add_value("triangles", triangles);
@@ -113,9 +122,9 @@ fn mesh_rows(report: &mut Report, mesh: &Mesh) {
     let (genus, components) = (genus(mesh), components(mesh));
     let text = format!(
         "closed {}, two-manifold {}, oriented {}, genus {}, components {}",
-        yes(closed),
-        yes(manifold),
-        yes(oriented),
+        yes_or_no(closed),
+        yes_or_no(manifold),
+        yes_or_no(oriented),
         genus.map_or_else(|| "undefined".to_owned(), |g| g.to_string()),
         components
     );
@@ -133,12 +142,8 @@ fn mesh_rows(report: &mut Report, mesh: &Mesh) {
     report.add_value("unobserved_share", unobserved);
 }
 
-fn yes(value: bool) -> &'static str {
-    if value { "yes" } else { "NO" }
-}
-
 /// Largest resident size of this process so far, bytes; known on Linux only.
-fn peak_memory() -> Option<f64> {
+fn peak_memory_bytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -1,8 +1,8 @@
 //! `puffer render`: a picture of a mesh.
 
 use super::input::check_output;
-use crate::failure::usage;
-use crate::picture::write_png;
+use crate::exit_status::usage_error;
+use crate::png_file::write_png;
 use anyhow::Result;
 use clap::Args;
 use puffer_core::geometry::Vec3;
@@ -10,9 +10,10 @@ use puffer_core::mesh::io::read_mesh;
 use puffer_core::mesh::render::{RenderView, render, render_sheet};
 use std::path::PathBuf;
 
-/// Shaded, coloured by uncertainty if there is one: green certain, red uncertain; back faces stand out.
+/// Shaded, coloured by uncertainty if there is one: green certain, red uncertain; back faces stand
+/// out.
 #[derive(Args)]
-pub struct Render {
+pub struct RenderCommand {
     /// Mesh to draw
     mesh: PathBuf,
     /// Picture to write, .png
@@ -26,7 +27,7 @@ pub struct Render {
     size: String,
 }
 
-impl Render {
+impl RenderCommand {
     pub(super) fn run(&self) -> Result<()> {
         check_output(&self.output, &["png"])?;
         let (width, height) = self.pixels()?;
@@ -47,7 +48,7 @@ impl Render {
             self.size.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
         match parsed {
             Some((w, h)) if (16..=16384).contains(&w) && (16..=16384).contains(&h) => Ok((w, h)),
-            _ => Err(usage(format!(
+            _ => Err(usage_error(format!(
                 "--size {}: expected two numbers from 16 to 16384, as in 1200x800",
                 self.size
             ))),
@@ -61,7 +62,7 @@ impl Render {
         let length = numbers.iter().flatten().map(|number| number * number).sum::<f64>().sqrt();
         match numbers.as_deref() {
             Ok(&[x, y, z]) if length.is_finite() && length > 0.0 => Ok(Some(Vec3::new(x, y, z))),
-            _ => Err(usage(format!("--from {text}: expected three numbers, as in 1,-1,0.5"))),
+            _ => Err(usage_error(format!("--from {text}: expected three numbers, as in 1,-1,0.5"))),
         }
     }
 }

@@ -1,24 +1,23 @@
 //! `puffer simulate`: a scan folder of an object, and apart from it the truth.
 
-use crate::failure::usage;
-use crate::progress::Watch;
-use crate::table::Report;
+use crate::exit_status::usage_error;
+use crate::progress::TerminalProgress;
+use crate::table::ResultTable;
 use anyhow::{Context, Result};
 use clap::Args;
-use puffer_core::geometry::{Cloud, Surface, Vec3};
+use puffer_core::geometry::{Cloud, Surface, Vec3, transform};
 use puffer_core::mesh::Mesh;
 use puffer_core::mesh::io::{Unit, read_mesh, write_cloud, write_mesh};
 use puffer_core::params::ParamValue;
-use puffer_core::scans::{
-    ScanSet, ScanSource, SensorKind, Support, View, write_poses, write_scans,
-};
+use puffer_core::scan::{SensorKind, Support};
+use puffer_core::scan_files::{ScanSet, ScanSource, View, write_poses, write_scans};
 use puffer_core::simulate::{NoiseFamily, SimulateParams, SimulatedScans, objects, simulate};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Scans with noise, outliers, drop-outs, occlusion and pose error; the truth goes to DIR.truth.
 #[derive(Args)]
-pub struct Simulate {
+pub struct SimulateCommand {
     /// Object by name (`puffer objects` lists them), or a closed mesh file in metres
     #[arg(long)]
     object: String,
@@ -42,16 +41,16 @@ pub struct Simulate {
     json: bool,
 }
 
-impl Simulate {
+impl SimulateCommand {
     pub(super) fn run(&self) -> Result<()> {
         let mut params = SimulateParams { family: self.family()?, ..SimulateParams::default() };
         params.set("views", &Value::from(self.views))?;
-        let truth = truth_of(&self.object)?;
-        let watch = Watch::start();
+        let truth = load_object(&self.object)?;
+        let watch = TerminalProgress::start();
         let scans = simulate(&truth, &params, self.seed, watch.progress())?;
         let times = watch.finish();
-        let truth_dir = write_folder(&self.output, &truth, &scans)?;
-        let mut report = Report::default();
+        let truth_dir = write_simulated_scans(&self.output, &truth, &scans)?;
+        let mut report = ResultTable::default();
         let points: usize = scans.views.iter().map(|v| v.scan.returns().count()).sum();
         report.add("views", scans.views.len().to_string(), "views", scans.views.len());
         report.add("points", points.to_string(), "points", points);
@@ -76,10 +75,10 @@ impl Simulate {
 
     fn family(&self) -> Result<NoiseFamily> {
         let of_setup =
-            NoiseFamily::of_setup(&self.setup).map_err(|error| usage(error.to_string()))?;
+            NoiseFamily::from_setup(&self.setup).map_err(|error| usage_error(error.to_string()))?;
         let Some(word) = &self.noise else { return Ok(of_setup) };
         NoiseFamily::from_value(&Value::from(word.as_str())).ok_or_else(|| {
-            usage(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
+            usage_error(format!("--noise {word}: there is {}", NoiseFamily::CHOICES.join(", ")))
         })
     }
 }
@@ -88,10 +87,10 @@ impl Simulate {
 ///
 /// # Errors
 /// No such object or file, or a mesh that is not closed.
-pub(crate) fn truth_of(object: &str) -> Result<Mesh> {
+pub fn load_object(object: &str) -> Result<Mesh> {
     let path = Path::new(object);
     if path.extension().is_none() && !path.exists() {
-        return Ok(objects::make(object)?);
+        return Ok(objects::make_object(object)?);
     }
     let mesh = read_mesh(path)?;
     objects::check_ground_truth(&mesh).with_context(|| object.to_owned())?;
@@ -102,7 +101,7 @@ pub(crate) fn truth_of(object: &str) -> Result<Mesh> {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub(crate) fn write_folder(dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<PathBuf> {
+pub fn write_simulated_scans(dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<PathBuf> {
     let truth_dir = truth_dir(dir)?;
     for folder in [dir, &truth_dir] {
         std::fs::create_dir_all(folder)
@@ -115,7 +114,7 @@ pub(crate) fn write_folder(dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> 
 /// `DIR.truth`, beside `DIR`.
 fn truth_dir(dir: &Path) -> Result<PathBuf> {
     let name = dir.file_name().ok_or_else(|| {
-        usage(format!("-o {}: give a folder with a name of its own", dir.display()))
+        usage_error(format!("-o {}: give a folder with a name of its own", dir.display()))
     })?;
     let mut name = name.to_os_string();
     name.push(".truth");
@@ -124,13 +123,13 @@ fn truth_dir(dir: &Path) -> Result<PathBuf> {
 
 fn write(dir: &Path, truth_dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> Result<()> {
     let sensor = if scans.family.is_stereo() { SensorKind::Stereo } else { SensorKind::Laser };
-    let view = |(i, view): (usize, &puffer_core::simulate::SimulatedView)| View {
+    let views = scans.views.iter().enumerate().map(|(i, view)| View {
         name: format!("view_{i:03}"),
         scan: view.scan.clone(),
         object_from_sensor: view.reported_pose,
-    };
+    });
     let set = ScanSet {
-        views: scans.views.iter().enumerate().map(view).collect(),
+        views: views.collect(),
         sensor: Some(sensor),
         pose_sigma: Some(scans.pose_sigma),
         support: Support::None,
@@ -138,22 +137,22 @@ fn write(dir: &Path, truth_dir: &Path, truth: &Mesh, scans: &SimulatedScans) -> 
     };
     write_scans(dir, &set, &[])?;
     let true_poses: Vec<_> = scans.views.iter().map(|v| v.true_pose).collect();
-    let written = ScanSource::open(dir, Unit::M)?;
+    let written = ScanSource::open(dir, Unit::Metre)?;
     write_poses(&truth_dir.join("poses.json"), &written, &true_poses, &[])?;
     write_mesh(&truth_dir.join("truth.ply"), truth, &[])?;
-    write_cloud(&truth_dir.join("seen.ply"), &seen(truth, scans)?, &[])?;
+    write_cloud(&truth_dir.join("seen.ply"), &seen_points(truth, scans)?, &[])?;
     Ok(())
 }
 
 /// The points of the truth that the scans saw, with the truth's normals, object frame.
-fn seen(truth: &Mesh, scans: &SimulatedScans) -> Result<Cloud> {
+fn seen_points(truth: &Mesh, scans: &SimulatedScans) -> Result<Cloud> {
     let surface = Surface::new(&truth.vertices, &truth.triangles)?;
     let mut cloud = Cloud::default();
     for view in &scans.views {
         for i in view.scan.returns() {
             let hit = Vec3::from(view.hits[i].map(f64::from));
             if hit.iter().all(|v| v.is_finite()) {
-                let point = view.true_pose.rotation * hit + view.true_pose.translation.vector;
+                let point = transform(&view.true_pose, &hit);
                 let normal = truth.triangle_normal(surface.project(&point).triangle);
                 cloud.push(point, normal, f64::NAN, 1);
             }

@@ -1,11 +1,11 @@
-//! The body of an ASCII PLY file: a line a row.
+//! The body of an ASCII PLY file: one line for each row.
 
-use super::{Column, Element, Kind, Number, Ply};
+use super::{NumberType, Ply, PlyElement, PropertyColumn, PropertyType};
 use crate::{Error, Result};
 use std::path::Path;
 
-/// The lines that hold something, with their numbers.
-pub(super) struct Lines<'a> {
+/// Iterates over the lines that are not empty, with their numbers.
+pub(super) struct NumberedLines<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Number of the line at `at`, from 1.
@@ -13,10 +13,10 @@ pub(super) struct Lines<'a> {
     newline: u8,
 }
 
-impl<'a> Lines<'a> {
-    /// The lines from byte `at` on, of which the first has number `line`.
-    pub(super) fn new(bytes: &'a [u8], at: usize, line: usize, newline: u8) -> Lines<'a> {
-        Lines { bytes, at, line, newline }
+impl<'a> NumberedLines<'a> {
+    /// Iterates from byte `at` on, where the first line has the number `line`.
+    pub(super) fn new(bytes: &'a [u8], at: usize, line: usize, newline: u8) -> NumberedLines<'a> {
+        NumberedLines { bytes, at, line, newline }
     }
 
     fn remaining(&self) -> usize {
@@ -24,7 +24,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-impl<'a> Iterator for Lines<'a> {
+impl<'a> Iterator for NumberedLines<'a> {
     type Item = (usize, &'a [u8]);
 
     fn next(&mut self) -> Option<(usize, &'a [u8])> {
@@ -42,8 +42,11 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// Longest part of a word that messages show.
+const MAX_SHOWN_CHARS: usize = 30;
+
 /// Reads all elements.
-pub(super) fn read(ply: &mut Ply, mut lines: Lines, path: &Path) -> Result<()> {
+pub(super) fn read(ply: &mut Ply, mut lines: NumberedLines, path: &Path) -> Result<()> {
     for element in &mut ply.elements {
         // An element without properties has empty rows.
         if !element.properties.is_empty() {
@@ -53,11 +56,11 @@ pub(super) fn read(ply: &mut Ply, mut lines: Lines, path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn read_element(element: &mut Element, lines: &mut Lines, path: &Path) -> Result<()> {
+fn read_element(element: &mut PlyElement, lines: &mut NumberedLines, path: &Path) -> Result<()> {
     let (count, name) = (element.count, element.name.clone());
     // Each number takes a digit and a separator; the last one of the file needs no separator.
-    let least = count.checked_mul(2 * element.properties.len());
-    if least.is_none_or(|least| least > lines.remaining() + 1) {
+    let min_bytes = count.checked_mul(2 * element.properties.len());
+    if min_bytes.is_none_or(|min_bytes| min_bytes > lines.remaining() + 1) {
         return Err(Error::format(
             path,
             format!(
@@ -70,7 +73,7 @@ fn read_element(element: &mut Element, lines: &mut Lines, path: &Path) -> Result
     }
     for property in &mut element.properties {
         if property.column.is_some() {
-            property.column = Some(Column::with_capacity(property.kind, count));
+            property.column = Some(PropertyColumn::with_capacity(property.kind, count));
         }
     }
     let mut row = Vec::new();
@@ -92,7 +95,7 @@ fn read_element(element: &mut Element, lines: &mut Lines, path: &Path) -> Result
 }
 
 fn read_row(
-    element: &mut Element,
+    element: &mut PlyElement,
     text: &[u8],
     row: &mut Vec<f64>,
 ) -> std::result::Result<(), String> {
@@ -100,22 +103,18 @@ fn read_row(
     let mut words = text.split_ascii_whitespace();
     for property in &mut element.properties {
         row.clear();
-        let mut take = |number| {
-            let word = words.next().ok_or_else(|| {
-                format!("ends before property '{}': the line is too short", property.name)
-            })?;
-            read_number(word, number, &property.name)
-        };
         match property.kind {
-            Kind::Scalar(number) => row.push(take(number)?),
-            Kind::List { count, item } => {
-                let count = take(count)?;
+            PropertyType::Scalar(number) => {
+                row.push(take_number(&mut words, number, &property.name)?)
+            }
+            PropertyType::List { count, item } => {
+                let count = take_number(&mut words, count, &property.name)?;
                 if count < 0.0 {
                     return Err(format!("list '{}' has the negative count {count}", property.name));
                 }
-                // The words themselves limit the rows: a count that is too large runs out of them.
+                // The words of the line limit the row: a count that is too large runs out of them.
                 for _ in 0..count as usize {
-                    row.push(take(item)?);
+                    row.push(take_number(&mut words, item, &property.name)?);
                 }
             }
         }
@@ -124,25 +123,39 @@ fn read_row(
         }
     }
     match words.next() {
-        Some(word) => Err(format!("'{}' stands after the last property", clip(word))),
+        Some(word) => Err(format!("'{}' stands after the last property", clip_word(word))),
         None => Ok(()),
     }
 }
 
-fn clip(word: &str) -> String {
-    word.chars().take(30).collect()
+/// The beginning of a word, for messages.
+fn clip_word(word: &str) -> String {
+    word.chars().take(MAX_SHOWN_CHARS).collect()
 }
 
-fn read_number(word: &str, number: Number, property: &str) -> std::result::Result<f64, String> {
+/// Parses the next word of a row.
+fn take_number<'a>(
+    words: &mut impl Iterator<Item = &'a str>,
+    number: NumberType,
+    property: &str,
+) -> std::result::Result<f64, String> {
+    let word = words
+        .next()
+        .ok_or_else(|| format!("ends before property '{property}': the line is too short"))?;
+    read_number(word, number, property)
+}
+
+/// Parses a number and checks it against the range of its type.
+fn read_number(word: &str, number: NumberType, property: &str) -> std::result::Result<f64, String> {
     let value = match number {
-        // Read in the precision of the property, so that no value is rounded twice.
-        Number::F32 => word.parse::<f32>().map(f64::from),
+        // Parsed in the precision of the property, so that no value is rounded twice.
+        NumberType::F32 => word.parse::<f32>().map(f64::from),
         _ => word.parse::<f64>(),
     };
     let value = value
         .ok()
-        .or_else(|| foreign_nan(word))
-        .ok_or_else(|| format!("'{}' is not a number (property '{property}')", clip(word)))?;
+        .or_else(|| parse_windows_nan(word))
+        .ok_or_else(|| format!("'{}' is not a number (property '{property}')", clip_word(word)))?;
     match number.range() {
         Some((low, high)) if !(value.fract() == 0.0 && (low..=high).contains(&value)) => {
             Err(format!(
@@ -153,8 +166,8 @@ fn read_number(word: &str, number: Number, property: &str) -> std::result::Resul
     }
 }
 
-/// The spellings of NaN that Windows writes.
-fn foreign_nan(word: &str) -> Option<f64> {
+/// NaN in the spellings that Windows programs write; `None` for other words.
+fn parse_windows_nan(word: &str) -> Option<f64> {
     let word = word.trim_start_matches('-').to_ascii_lowercase();
     (word.starts_with("nan(") || word.starts_with("1.#")).then_some(f64::NAN)
 }

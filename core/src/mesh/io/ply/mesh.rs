@@ -1,70 +1,84 @@
 //! Meshes in PLY files.
 
-use super::{Column, Element, Layout, Ply, parse, push_floats};
+use super::{Ply, PlyElement, PlyHeader, PropertyColumn, parse, push_floats};
 use crate::geometry::Vec3;
 use crate::mesh::Mesh;
-use crate::mesh::io::colour::{confidence_colour, confidence_scale};
-use crate::mesh::io::polygons::Polygons;
+use crate::mesh::io::confidence_colour::{confidence_colour, confidence_scale};
+use crate::mesh::io::polygons::PolygonFans;
 use crate::{Error, Result};
 use std::path::Path;
 
-const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
-const NORMALS: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
+/// Bytes of a vertex with all attributes.
+const MAX_VERTEX_BYTES: usize = 32;
+/// Bytes of a triangle: its count of corners and three indices.
+const FACE_BYTES: usize = 13;
+/// Names in use for the vertex indices of a face.
+const INDEX_PROPERTIES: [&str; 2] = ["vertex_indices", "vertex_index"];
+/// Names in use for the components of a normal.
+const NORMAL_PROPERTIES: [[&str; 3]; 2] =
+    [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
 
-/// Reads a mesh; polygons are cut into fans.
+/// Reads a mesh; polygons are split into fans of triangles.
 pub(in crate::mesh::io) fn parse_mesh(bytes: &[u8], path: &Path) -> Result<Mesh> {
-    let wanted = |element: &str, property: &str| match element {
-        "vertex" => NORMALS
-            .iter()
-            .flatten()
-            .chain(&["x", "y", "z", "sigma", "observed"])
-            .any(|n| *n == property),
-        "face" => INDICES.contains(&property),
-        _ => false,
-    };
-    let ply = parse(bytes, path, &wanted)?;
-    let vertex = ply.require(path, "vertex", "a mesh needs vertices")?;
-    let rows = |columns: [&Column; 3]| -> Vec<Vec3> {
-        let point = |i| Vec3::new(columns[0].get(i), columns[1].get(i), columns[2].get(i));
-        (0..vertex.count).map(point).collect()
-    };
-    let mut mesh = Mesh::new(rows(positions(vertex, path)?), triangles(&ply, vertex.count, path)?);
-    mesh.normals = normals(vertex).map(rows).unwrap_or_default();
-    if let Some(sigma) = vertex.scalar(&["sigma"]) {
-        mesh.sigma = (0..vertex.count).map(|i| sigma.get(i)).collect();
+    let ply = parse(bytes, path, &is_mesh_property)?;
+    let vertex = ply.require_element(path, "vertex", "a mesh needs vertices")?;
+    let vertices = read_vectors(vertex.count, position_columns(vertex, path)?);
+    let mut mesh = Mesh::new(vertices, parse_triangles(&ply, vertex.count, path)?);
+    mesh.normals =
+        normal_columns(vertex).map(|c| read_vectors(vertex.count, c)).unwrap_or_default();
+    if let Some(sigma) = vertex.scalar_column(&["sigma"]) {
+        mesh.sigma = (0..vertex.count).map(|i| sigma.scalar_at(i)).collect();
     }
-    if let Some(observed) = vertex.scalar(&["observed"]) {
-        mesh.observed = (0..vertex.count).map(|i| observed.get(i) != 0.0).collect();
+    if let Some(observed) = vertex.scalar_column(&["observed"]) {
+        mesh.observed = (0..vertex.count).map(|i| observed.scalar_at(i) != 0.0).collect();
     }
     Ok(mesh)
 }
 
+/// Whether a mesh is made of this property.
+fn is_mesh_property(element: &str, property: &str) -> bool {
+    match element {
+        "vertex" => is_normal(property) || ["x", "y", "z", "sigma", "observed"].contains(&property),
+        "face" => INDEX_PROPERTIES.contains(&property),
+        _ => false,
+    }
+}
+
+/// The first `count` rows of three columns as vectors.
+fn read_vectors(count: usize, [x, y, z]: [&PropertyColumn; 3]) -> Vec<Vec3> {
+    (0..count).map(|i| Vec3::new(x.scalar_at(i), y.scalar_at(i), z.scalar_at(i))).collect()
+}
+
 /// The columns x, y and z.
-pub(super) fn positions<'a>(vertex: &'a Element, path: &Path) -> Result<[&'a Column; 3]> {
-    vertex.triple(["x", "y", "z"]).ok_or_else(|| {
+pub(super) fn position_columns<'a>(
+    vertex: &'a PlyElement,
+    path: &Path,
+) -> Result<[&'a PropertyColumn; 3]> {
+    vertex.vector_columns(["x", "y", "z"]).ok_or_else(|| {
         let has: Vec<_> = vertex.properties.iter().map(|p| p.name.as_str()).collect();
         let has = has.join(", ");
         Error::format(path, format!("its vertices need the properties x, y and z, but have: {has}"))
     })
 }
 
-/// The columns of the normal, by either of the names in use.
-pub(super) fn normals(vertex: &Element) -> Option<[&Column; 3]> {
-    NORMALS.into_iter().find_map(|names| vertex.triple(names))
+/// The columns of the normal, if the vertices have one.
+pub(super) fn normal_columns(vertex: &PlyElement) -> Option<[&PropertyColumn; 3]> {
+    NORMAL_PROPERTIES.into_iter().find_map(|names| vertex.vector_columns(names))
 }
 
 /// Whether `property` is a component of a normal.
 pub(super) fn is_normal(property: &str) -> bool {
-    NORMALS.as_flattened().contains(&property)
+    NORMAL_PROPERTIES.as_flattened().contains(&property)
 }
 
-fn triangles(ply: &Ply, vertices: usize, path: &Path) -> Result<Vec<[u32; 3]>> {
+/// The triangles of the faces.
+fn parse_triangles(ply: &Ply, vertices: usize, path: &Path) -> Result<Vec<[u32; 3]>> {
     let purpose = "it is a point cloud or of another kind, not a mesh of faces";
-    let face = ply.require(path, "face", purpose)?;
-    let (starts, values) = face.list(&INDICES).ok_or_else(|| {
+    let face = ply.require_element(path, "face", purpose)?;
+    let (starts, values) = face.list_column(&INDEX_PROPERTIES).ok_or_else(|| {
         Error::format(path, "its faces have no list 'vertex_indices': it tells no triangles")
     })?;
-    let mut polygons = Polygons::new(vertices);
+    let mut polygons = PolygonFans::new(vertices);
     for (index, range) in starts.windows(2).enumerate() {
         let corners = &values[range[0]..range[1]];
         polygons.push(corners).map_err(|e| Error::format(path, format!("face {index} {e}")))?;
@@ -72,30 +86,30 @@ fn triangles(ply: &Ply, vertices: usize, path: &Path) -> Result<Vec<[u32; 3]>> {
     polygons.finish(path)
 }
 
-/// The file's bytes: the columns of the page "Output mesh", without those that the mesh does not have (the
-/// colours come from sigma).
+/// The bytes of a file. Vertices have x y z and nx ny nz and, if the mesh has them, red green blue
+/// (the colours of sigma), sigma and observed.
 pub(in crate::mesh::io) fn write_mesh(mesh: &Mesh, comments: &[String]) -> Vec<u8> {
-    let (sigma, observed) = (!mesh.sigma.is_empty(), !mesh.observed.is_empty());
+    let (has_sigma, has_observed) = (!mesh.sigma.is_empty(), !mesh.observed.is_empty());
     let mut properties = vec!["float x", "float y", "float z", "float nx", "float ny", "float nz"];
-    if sigma {
+    if has_sigma {
         properties.extend(["uchar red", "uchar green", "uchar blue", "float sigma"]);
     }
-    if observed {
+    if has_observed {
         properties.push("uchar observed");
     }
-    let mut layout = Layout::new(comments);
-    layout.element("vertex", mesh.vertices.len(), &properties);
-    layout.element("face", mesh.triangles.len(), &["list uchar int vertex_indices"]);
-    let mut bytes = layout.into_bytes();
-    bytes.reserve(mesh.vertices.len() * 32 + mesh.triangles.len() * 13);
+    let mut header = PlyHeader::new(comments);
+    header.add_element("vertex", mesh.vertices.len(), &properties);
+    header.add_element("face", mesh.triangles.len(), &["list uchar int vertex_indices"]);
+    let mut bytes = header.into_bytes();
+    bytes.reserve(mesh.vertices.len() * MAX_VERTEX_BYTES + mesh.triangles.len() * FACE_BYTES);
     let scale = confidence_scale(&mesh.sigma);
     for (i, vertex) in mesh.vertices.iter().enumerate() {
         push_floats(&mut bytes, vertex.iter().chain(mesh.normals[i].iter()).map(|v| *v as f32));
-        if sigma {
+        if has_sigma {
             bytes.extend_from_slice(&confidence_colour(mesh.sigma[i], scale));
             push_floats(&mut bytes, [mesh.sigma[i] as f32]);
         }
-        if observed {
+        if has_observed {
             bytes.push(mesh.observed[i].into());
         }
     }

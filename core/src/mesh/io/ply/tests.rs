@@ -24,34 +24,36 @@ fn file(format: &str, newline: &str) -> Vec<u8> {
         bytes.extend(body.replace('\n', newline).bytes());
         return bytes;
     }
-    let mut push = |mut little: Vec<u8>| {
+    let little_endian: Vec<Vec<u8>> = vec![
+        (-1i8).to_le_bytes().into(),
+        vec![255],
+        (-300i16).to_le_bytes().into(),
+        65535u16.to_le_bytes().into(),
+        (-70000i32).to_le_bytes().into(),
+        4_000_000_000u32.to_le_bytes().into(),
+        0.5f32.to_le_bytes().into(),
+        1e-9f64.to_le_bytes().into(),
+        vec![2],
+        vec![3],
+        4i16.to_le_bytes().into(),
+        5u16.to_le_bytes().into(),
+        6i32.to_le_bytes().into(),
+        7u32.to_le_bytes().into(),
+        f32::NAN.to_le_bytes().into(),
+        f64::NAN.to_le_bytes().into(),
+        vec![3],
+        (-1i16).to_le_bytes().into(),
+        2i16.to_le_bytes().into(),
+        (-3i16).to_le_bytes().into(),
+        vec![9],
+        42i32.to_le_bytes().into(),
+    ];
+    for mut number in little_endian {
         if format == "binary_big_endian" {
-            little.reverse();
+            number.reverse();
         }
-        bytes.extend(little);
-    };
-    push((-1i8).to_le_bytes().into());
-    push(vec![255]);
-    push((-300i16).to_le_bytes().into());
-    push(65535u16.to_le_bytes().into());
-    push((-70000i32).to_le_bytes().into());
-    push(4_000_000_000u32.to_le_bytes().into());
-    push(0.5f32.to_le_bytes().into());
-    push(1e-9f64.to_le_bytes().into());
-    push(vec![2]);
-    push(vec![3]);
-    push(4i16.to_le_bytes().into());
-    push(5u16.to_le_bytes().into());
-    push(6i32.to_le_bytes().into());
-    push(7u32.to_le_bytes().into());
-    push(f32::NAN.to_le_bytes().into());
-    push(f64::NAN.to_le_bytes().into());
-    push(vec![3]);
-    for item in [-1i16, 2, -3] {
-        push(item.to_le_bytes().into());
+        bytes.extend(number);
     }
-    push(vec![9]);
-    push(42i32.to_le_bytes().into());
     bytes
 }
 
@@ -59,16 +61,16 @@ fn check(ply: &Ply) {
     assert_eq!(ply.comments, ["made by hand"]);
     assert_eq!(ply.info_number("num_cols"), Some(7));
     let vertex = ply.element("vertex").unwrap();
-    let row = |i| -> Vec<f64> {
-        vertex.properties.iter().map(|p| p.column.as_ref().unwrap().get(i)).collect()
-    };
-    assert_eq!(row(0), [-1.0, 255.0, -300.0, 65535.0, -70000.0, 4e9, 0.5, 1e-9]);
-    assert_eq!(row(1)[..6], [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-    assert!(row(1)[6].is_nan() && row(1)[7].is_nan());
+    let rows = [0, 1].map(|i| -> Vec<f64> {
+        vertex.properties.iter().map(|p| p.column.as_ref().unwrap().scalar_at(i)).collect()
+    });
+    assert_eq!(rows[0], [-1.0, 255.0, -300.0, 65535.0, -70000.0, 4e9, 0.5, 1e-9]);
+    assert_eq!(rows[1][..6], [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    assert!(rows[1][6].is_nan() && rows[1][7].is_nan());
     let odd = ply.element("odd").unwrap();
-    assert_eq!(odd.list(&["l"]), Some((&[0, 3][..], &[-1.0, 2.0, -3.0][..])));
-    assert_eq!(odd.scalar(&["after"]).unwrap().get(0), 9.0);
-    assert_eq!(ply.element("last").unwrap().scalar(&["v"]).unwrap().get(0), 42.0);
+    assert_eq!(odd.list_column(&["l"]), Some((&[0, 3][..], &[-1.0, 2.0, -3.0][..])));
+    assert_eq!(odd.scalar_column(&["after"]).unwrap().scalar_at(0), 9.0);
+    assert_eq!(ply.element("last").unwrap().scalar_column(&["v"]).unwrap().scalar_at(0), 42.0);
 }
 
 #[test]
@@ -85,17 +87,19 @@ fn unwanted_columns_are_not_kept() {
     let bytes = file("binary_big_endian", "\n");
     let ply = parse(&bytes, Path::new("x.ply"), &|e, p| e == "last" && p == "v").unwrap();
     assert!(ply.element("vertex").unwrap().properties.iter().all(|p| p.column.is_none()));
-    assert_eq!(ply.element("last").unwrap().scalar(&["v"]).unwrap().get(0), 42.0);
+    assert_eq!(ply.element("last").unwrap().scalar_column(&["v"]).unwrap().scalar_at(0), 42.0);
+}
+
+/// An ASCII file with two vertices and a face in its header.
+fn ascii(body: &str) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty uchar n\n\
+         element face 1\nproperty list char int vertex_indices\nend_header\n{body}"
+    )
 }
 
 #[test]
 fn malformed_files_say_what_and_where() {
-    let ascii = |body: &str| {
-        format!(
-            "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty uchar n\n\
-             element face 1\nproperty list char int vertex_indices\nend_header\n{body}"
-        )
-    };
     let cases: Vec<(Vec<u8>, &str)> = vec![
         (b"solid".to_vec(), "not a PLY file"),
         (b"plywood\n".to_vec(), "not a PLY file"),
@@ -127,33 +131,33 @@ fn malformed_files_say_what_and_where() {
     }
 }
 
+/// The error of a binary file with this count of vertices, type of list counts and body.
+fn binary_error(vertices: &str, count: &str, body: &[u8]) -> String {
+    let header = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\n\
+         element face 2\nproperty list {count} int vertex_indices\nend_header\n"
+    );
+    let mut bytes = header.into_bytes();
+    bytes.extend(body);
+    error_of(&bytes)
+}
+
 #[test]
 fn malformed_binary_files_say_what_and_where() {
-    let header = |vertices: &str, count: &str| {
-        format!(
-            "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\n\
-             element face 2\nproperty list {count} int vertex_indices\nend_header\n"
-        )
-    };
-    let with = |vertices: &str, count: &str, body: &[u8]| {
-        let mut bytes = header(vertices, count).into_bytes();
-        bytes.extend(body);
-        error_of(&bytes)
-    };
-    let error = with("3", "uchar", &[0; 9]);
+    let error = binary_error("3", "uchar", &[0; 9]);
     assert!(error.contains("promises 3 rows of element 'vertex'"), "{error}");
     assert!(error.contains("in vertex 2: it is truncated"), "{error}");
-    let error = with("4611686018427387905", "uchar", &[0; 9]);
+    let error = binary_error("4611686018427387905", "uchar", &[0; 9]);
     assert!(error.contains("the count is wrong"), "{error}");
     let mut body = vec![0; 4];
     body.extend((-2i32).to_le_bytes());
     body.extend([0; 8]);
-    let error = with("1", "int", &body);
+    let error = binary_error("1", "int", &body);
     assert!(error.contains("face 0 of 2): list 'vertex_indices' has the count -2"), "{error}");
     let mut body = vec![0; 4];
     body.extend(u32::MAX.to_le_bytes());
     body.extend([0; 8]);
-    let error = with("1", "uint", &body);
+    let error = binary_error("1", "uint", &body);
     assert!(error.contains("has the count 4294967295, but 8 bytes follow"), "{error}");
 }
 

@@ -1,19 +1,19 @@
 //! `puffer bag info`.
 
-use super::Notes;
+use crate::notes::BagNotes;
 use crate::table::print_rows;
 use anyhow::Result;
 use clap::Args;
-use puffer_shell::bag::{BagInfo, BagReader};
+use puffer_ros::bag::{BagInfo, BagReader};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Notes longer than this are told by their length, characters.
-const SHORT: usize = 60;
+/// Of a longer note only the length is printed, characters.
+const MAX_NOTE_LENGTH: usize = 60;
 
 /// Topics, types, counts and times of a bag, and what of it is damaged.
 #[derive(Args)]
-pub struct Info {
+pub struct InfoCommand {
     /// An .mcap file, or a rosbag2 folder of them
     #[arg(value_name = "BAG")]
     path: PathBuf,
@@ -22,12 +22,12 @@ pub struct Info {
     json: bool,
 }
 
-impl Info {
+impl InfoCommand {
     pub(super) fn run(&self) -> Result<()> {
         let bag = BagReader::open(&self.path)?;
         let info = bag.info();
-        // Of a damaged note the text is told all the same.
-        let notes = bag.metadata(puffer_shell::scans::NOTES).unwrap_or_default();
+        // The text of a note is printed even if it is damaged.
+        let notes = bag.metadata(puffer_ros::scans::RUN_METADATA_NAME).unwrap_or_default();
         if self.json {
             println!("{}", as_json(&info, &notes));
             return Ok(());
@@ -43,7 +43,7 @@ impl Info {
             rows.push((topic.name.to_string(), text));
         }
         for (key, text) in &notes {
-            let text = if text.chars().count() > SHORT || text.contains('\n') {
+            let text = if text.chars().count() > MAX_NOTE_LENGTH || text.contains('\n') {
                 format!("{} characters", text.chars().count())
             } else {
                 text.clone()
@@ -52,7 +52,7 @@ impl Info {
         }
         rows.extend(info.damage.iter().map(|d| ("DAMAGED".to_owned(), d.clone())));
         print_rows(&rows);
-        if let Err(error) = Notes::of(&bag) {
+        if let Err(error) = BagNotes::from_bag(&bag) {
             eprintln!("puffer: {error:#}");
         }
         Ok(())

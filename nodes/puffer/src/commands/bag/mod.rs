@@ -1,45 +1,42 @@
 //! `puffer bag`: bags of ROS 2 messages.
 
-mod finish;
+mod command_node;
 mod info;
-mod node;
-mod notes;
 mod play;
+mod played_scans;
 mod record;
 mod scans;
 pub(crate) mod topics;
-
-pub(crate) use notes::Notes;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
 /// Looks into, records and plays MCAP bags, and takes the scans out of them.
 #[derive(Args)]
-pub struct Bag {
+pub struct BagCommand {
     #[command(subcommand)]
-    command: BagCommand,
+    command: BagAction,
 }
 
 #[derive(Subcommand)]
-enum BagCommand {
+enum BagAction {
     /// Tell what is in a bag
-    Info(info::Info),
+    Info(info::InfoCommand),
     /// Record topics until Ctrl-C
-    Record(record::Record),
+    Record(record::RecordCommand),
     /// Publish what a bag holds
-    Play(play::Play),
+    Play(play::PlayCommand),
     /// Write the scans of a bag as a scan folder
-    Scans(scans::Scans),
+    Scans(scans::ScansCommand),
 }
 
-impl Bag {
+impl BagCommand {
     pub(super) fn run(&self) -> Result<()> {
         match &self.command {
-            BagCommand::Info(command) => command.run(),
-            BagCommand::Record(command) => command.run(),
-            BagCommand::Play(command) => command.run(),
-            BagCommand::Scans(command) => command.run(),
+            BagAction::Info(command) => command.run(),
+            BagAction::Record(command) => command.run(),
+            BagAction::Play(command) => command.run(),
+            BagAction::Scans(command) => command.run(),
         }
     }
 }

@@ -1,14 +1,14 @@
 //! `puffer bag play`.
 
-use super::finish::{Finish, Pace};
-use super::node::{interrupted, with_node};
+use super::command_node::{interruption_error, with_node};
+use super::played_scans::{PlayedScans, ScanPacing};
 use super::topics;
-use crate::failure::usage;
+use crate::exit_status::usage_error;
 use anyhow::{Result, bail};
 use clap::Args;
 use puffer_msgs::sensor_msgs::msg::PointCloud2;
-use puffer_shell::bag::{BagMessage, BagReader, BagTopic, Player};
-use puffer_shell::{Interface, NoParams, Node, Stop};
+use puffer_ros::bag::{BagMessage, BagReader, BagTopic, Player};
+use puffer_ros::{Interface, NoParams, Node, Stop};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,10 +18,10 @@ const READERS_DEADLINE: Duration = Duration::from_secs(15);
 /// How long the last messages may take to arrive.
 const FLUSH_DEADLINE: Duration = Duration::from_secs(60);
 
-/// Publishes what a bag holds on the domain ROS_DOMAIN_ID: without --topics only what came from robot and sensor, so that
-/// running nodes do with it what they did before.
+/// Publishes what a bag holds on the domain ROS_DOMAIN_ID: without --topics only what came from
+/// robot and sensor, so that running nodes do with it what they did before.
 #[derive(Args)]
-pub struct Play {
+pub struct PlayCommand {
     /// An .mcap file, or a rosbag2 folder of them
     #[arg(value_name = "BAG")]
     path: PathBuf,
@@ -36,10 +36,10 @@ pub struct Play {
     finish: bool,
 }
 
-impl Play {
+impl PlayCommand {
     pub(super) fn run(&self) -> Result<()> {
         if !(self.rate >= 0.0 && self.rate.is_finite()) {
-            return Err(usage(format!("--rate {}: must be 0 or more", self.rate)));
+            return Err(usage_error(format!("--rate {}: must be 0 or more", self.rate)));
         }
         let bag = BagReader::open(&self.path)?;
         let chosen = self.chosen(&bag.info().topics)?;
@@ -58,13 +58,7 @@ impl Play {
             }
             return Ok(inputs);
         }
-        let find = |name: &String| {
-            topics.iter().find(|t| &*t.name == name).cloned().ok_or_else(|| {
-                let known = topics.iter().map(|t| &*t.name).collect::<Vec<_>>().join(", ");
-                usage(format!("--topics {name}: is not in the bag; there are {known}"))
-            })
-        };
-        self.topics.iter().map(find).collect()
+        self.topics.iter().map(|name| topic_by_name(topics, name)).collect()
     }
 
     async fn play(
@@ -74,11 +68,11 @@ impl Play {
         chosen: &[BagTopic],
         stop: &Stop,
     ) -> Result<()> {
-        let finish = if self.finish { Some(Finish::new(node)?) } else { None };
-        let routes: Vec<_> = chosen.iter().map(topics::played).collect();
+        let scans = if self.finish { Some(PlayedScans::new(node)?) } else { None };
+        let routes: Vec<_> = chosen.iter().map(topics::playback_route).collect();
         let player = Player::new(node, &routes)?;
         let ready = stop.or(player.wait_for_readers(READERS_DEADLINE)).await;
-        if let Err(error) = ready.ok_or_else(interrupted)? {
+        if let Err(error) = ready.ok_or_else(interruption_error)? {
             if self.finish {
                 return Err(error.context("the nodes must run before the bag is played"));
             }
@@ -92,19 +86,29 @@ impl Play {
             .filter(|t| *t.type_name == *PointCloud2::TYPE_NAME)
             .map(|t| &*t.name)
             .collect();
-        let mut pace = Pace::default();
-        let before = async |message: &BagMessage| match &finish {
-            Some(finish) => pace.before(message, &clouds, finish).await,
-            None => Ok(()),
-        };
-        let count = stop.or(player.play(bag.messages(&names)?, rate, before)).await;
-        let count = count.ok_or_else(interrupted)??;
-        stop.or(player.flush(FLUSH_DEADLINE)).await.ok_or_else(interrupted)??;
+        let mut pacing = ScanPacing::default();
+        let played =
+            player.play(bag.messages(&names)?, rate, async |message: &BagMessage| match &scans {
+                Some(scans) => pacing.wait_for_turn(message, &clouds, scans).await,
+                None => Ok(()),
+            });
+        let count = stop.or(played).await;
+        let count = count.ok_or_else(interruption_error)??;
+        stop.or(player.flush(FLUSH_DEADLINE)).await.ok_or_else(interruption_error)??;
         eprintln!("{count} messages of {} topics on DDS domain {}", names.len(), node.domain());
-        if let Some(finish) = finish {
-            let mesh = stop.or(finish.mesh(pace.clouds)).await.ok_or_else(interrupted)??;
+        if let Some(scans) = scans {
+            let mesh =
+                stop.or(scans.make_mesh(pacing.clouds)).await.ok_or_else(interruption_error)??;
             println!("{mesh}");
         }
         Ok(())
     }
+}
+
+/// The topic of a bag that the user names.
+fn topic_by_name(topics: &[BagTopic], name: &str) -> Result<BagTopic> {
+    topics.iter().find(|topic| &*topic.name == name).cloned().ok_or_else(|| {
+        let known = topics.iter().map(|topic| &*topic.name).collect::<Vec<_>>().join(", ");
+        usage_error(format!("--topics {name}: is not in the bag; there are {known}"))
+    })
 }

@@ -1,19 +1,20 @@
 //! `puffer bag record`.
 
-use super::{node::with_node, topics};
-use crate::failure::usage;
+use super::{command_node::with_node, topics};
+use crate::exit_status::usage_error;
 use anyhow::Result;
 use clap::Args;
-use puffer_shell::bag::{BagWriter, Recording, TopicRoute};
+use puffer_ros::bag::{BagWriter, Recording, TopicRoute};
 use std::path::PathBuf;
 
 /// Records topics of the domain ROS_DOMAIN_ID until Ctrl-C.
 #[derive(Args)]
-pub struct Record {
+pub struct RecordCommand {
     /// Bag to write, .mcap; must not exist
     #[arg(short, long, value_name = "BAG")]
     output: PathBuf,
-    /// Topics with their types, such as /points:sensor_msgs/msg/PointCloud2 [default: all of the suite]
+    /// Topics with their types, such as /points:sensor_msgs/msg/PointCloud2 [default: all of the
+    /// suite]
     #[arg(value_name = "TOPIC:TYPE")]
     topics: Vec<String>,
     /// Stamp messages with /clock instead of this machine's time
@@ -21,10 +22,13 @@ pub struct Record {
     use_sim_time: bool,
 }
 
-impl Record {
+impl RecordCommand {
     pub(super) fn run(&self) -> Result<()> {
         if self.output.extension().is_none_or(|e| e != "mcap") {
-            return Err(usage(format!("-o {}: the name must end in .mcap", self.output.display())));
+            return Err(usage_error(format!(
+                "-o {}: the name must end in .mcap",
+                self.output.display()
+            )));
         }
         let topics = self.routes()?;
         let bag = BagWriter::create(&self.output)?;
@@ -45,13 +49,13 @@ impl Record {
 
     fn routes(&self) -> Result<Vec<TopicRoute>> {
         if self.topics.is_empty() {
-            return Ok(topics::suite());
+            return Ok(topics::suite_routes());
         }
         let parsed = self.topics.iter().map(|text| match text.split_once(':') {
             Some((name, type_name)) if !name.is_empty() && !type_name.is_empty() => {
-                Ok(topics::named(name, type_name))
+                Ok(topics::route_of_name(name, type_name))
             }
-            _ => Err(usage(format!(
+            _ => Err(usage_error(format!(
                 "{text}: expected TOPIC:TYPE, such as /points:sensor_msgs/msg/PointCloud2"
             ))),
         });

@@ -1,19 +1,19 @@
 //! `puffer bag scans`.
 
-use super::Notes;
 use crate::commands::input::bag_params;
-use crate::failure::usage;
+use crate::exit_status::usage_error;
+use crate::notes::BagNotes;
 use crate::parameters::ParameterArgs;
-use crate::progress::Watch;
+use crate::progress::TerminalProgress;
 use anyhow::Result;
 use clap::Args;
-use puffer_core::scans::write_scans;
-use puffer_shell::scans::scans_of_bag;
+use puffer_core::scan_files::write_scans;
+use puffer_ros::scans::scans_of_bag;
 use std::path::PathBuf;
 
 /// Cuts the clouds of a bag as scan_registrar does and writes them with the robot's poses.
 #[derive(Args)]
-pub struct Scans {
+pub struct ScansCommand {
     /// An .mcap file, or a rosbag2 folder of them
     #[arg(value_name = "BAG")]
     path: PathBuf,
@@ -24,15 +24,18 @@ pub struct Scans {
     parameters: ParameterArgs,
 }
 
-impl Scans {
+impl ScansCommand {
     pub(super) fn run(&self) -> Result<()> {
         if std::fs::read_dir(&self.output).is_ok_and(|mut entries| entries.next().is_some()) {
-            return Err(usage(format!("-o {}: holds something already", self.output.display())));
+            return Err(usage_error(format!(
+                "-o {}: holds something already",
+                self.output.display()
+            )));
         }
-        let notes = Notes::read(&self.path)?;
+        let notes = BagNotes::read(&self.path)?;
         let params = bag_params(&notes, &self.parameters)?;
-        let watch = Watch::start();
-        let mut set = scans_of_bag(&self.path, &params.of_registrar(), watch.progress())?;
+        let watch = TerminalProgress::start();
+        let mut set = scans_of_bag(&self.path, &params.registrar_params(), watch.progress())?;
         watch.finish();
         (set.sensor, set.support) = (notes.sensor(), notes.support());
         write_scans(&self.output, &set, &[])?;

@@ -1,28 +1,28 @@
 //! Checks of the machine itself.
 
-use super::Check;
+use super::check::Check;
 use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Enough for a few million points.
-const LEAST_MEMORY_GB: f64 = 2.0;
+const MIN_MEMORY_GB: f64 = 2.0;
 /// 2025-01-01, seconds since 1970: before this program was written.
-const EARLIEST: u64 = 1_735_689_600;
+const EARLIEST_UNIX_TIME: u64 = 1_735_689_600;
 /// How long the clock is watched, and how far it may jump meanwhile.
-const WATCH: Duration = Duration::from_millis(100);
-const JUMP: f64 = 0.02;
+const CLOCK_WATCH_TIME: Duration = Duration::from_millis(100);
+const MAX_CLOCK_JUMP_S: f64 = 0.02;
 
 pub(super) fn checks() -> Vec<Check> {
-    vec![cores(), memory(), temporary_space(), clock()]
+    vec![check_cores(), check_memory(), check_temporary_files(), check_clock()]
 }
 
-fn cores() -> Check {
+fn check_cores() -> Check {
     let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
     let mend = "check the process's CPU affinity (taskset -p $$)";
     Check::new("processor cores", cores >= 1, cores.to_string(), mend)
 }
 
-fn memory() -> Check {
+fn check_memory() -> Check {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let gigabytes = text
         .lines()
@@ -31,13 +31,13 @@ fn memory() -> Check {
         .map(|kilobytes| kilobytes * 1024.0 / 1e9);
     Check::new(
         "free memory",
-        gigabytes.is_none_or(|gb| gb >= LEAST_MEMORY_GB),
+        gigabytes.is_none_or(|gb| gb >= MIN_MEMORY_GB),
         gigabytes.map_or_else(|| "unknown".into(), |gb| format!("{gb:.1} GB")),
         "close other programs; 2 GB hold a few million points",
     )
 }
 
-fn temporary_space() -> Check {
+fn check_temporary_files() -> Check {
     let folder = std::env::temp_dir();
     let probe = folder.join(format!("puffer-doctor-{}", std::process::id()));
     let outcome = write_probe(&probe);
@@ -58,17 +58,26 @@ fn write_probe(path: &Path) -> std::io::Result<()> {
     written
 }
 
+/// Seconds since 1970 by the system's clock.
+fn unix_time() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |time| time.as_secs_f64())
+}
+
 /// Transforms and scans meet by their stamps: the clock has to be right, and steady.
-fn clock() -> Check {
+fn check_clock() -> Check {
     let mend = "sudo timedatectl set-ntp true, on every machine of the robot";
-    let seconds = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
-    let (steady, before) = (Instant::now(), seconds());
-    std::thread::sleep(WATCH);
-    let jump = seconds() - before - steady.elapsed().as_secs_f64();
-    let found = match (before as u64 >= EARLIEST, jump.abs() <= JUMP) {
+    let (steady, before) = (Instant::now(), unix_time());
+    std::thread::sleep(CLOCK_WATCH_TIME);
+    let jump = unix_time() - before - steady.elapsed().as_secs_f64();
+    let found = match (before as u64 >= EARLIEST_UNIX_TIME, jump.abs() <= MAX_CLOCK_JUMP_S) {
         (false, _) => format!("stands at {before:.0} s since 1970, which is long past"),
         (true, false) => format!("jumped by {:.0} ms while it was watched", jump * 1e3),
         (true, true) => "set, and steady".to_owned(),
     };
-    Check::new("clock", before as u64 >= EARLIEST && jump.abs() <= JUMP, found, mend)
+    Check::new(
+        "clock",
+        before as u64 >= EARLIEST_UNIX_TIME && jump.abs() <= MAX_CLOCK_JUMP_S,
+        found,
+        mend,
+    )
 }
