@@ -109,7 +109,7 @@ impl Planner {
     /// ignored.
     ///
     /// # Errors
-    /// As [`ViewSpace::integrate_with`].
+    /// As [`ViewSpace::integrate_with_beyond`].
     pub fn on_scan(&mut self, update: ScanUpdate) -> Result<()> {
         if self.scans.is_superseded(update.version) {
             return Ok(());
@@ -219,7 +219,7 @@ impl Planner {
     /// Integrates scan `id` into the space.
     fn integrate(&mut self, id: u32) -> Result<()> {
         let Some(stored) = self.scans.get(id) else { return Ok(()) };
-        self.space.integrate_with(&stored.scan, &stored.beyond, &stored.pose)?;
+        self.space.integrate_with_beyond(&stored.scan, &stored.beyond, &stored.pose)?;
         self.integrated.push(ScanVersion { id, version: stored.version });
         Ok(())
     }

@@ -107,7 +107,7 @@ impl Striper {
                 let laser = self.origin(index / PROFILE_POINTS) + walk[index / PROFILE_POINTS];
                 let camera = laser - Vec3::y() * self.model.camera_offset;
                 let ray = self.ray(index % PROFILE_POINTS);
-                scene.cast_ray(object_from_sensor, &laser, &ray, &camera)
+                scene.cast_ray_seen_by_both(object_from_sensor, &laser, &ray, &camera)
             })
             .collect();
         let rows: Vec<Vec<MeasuredPoint>> = (0..self.model.profiles)

@@ -69,7 +69,7 @@ impl SimulatedScene {
     /// The first point on the ray from `origin` along the unit vector `direction` that is also
     /// visible from `second_eye` (all in the sensor frame, metres); `None` if there is none or it
     /// is hidden from there. The `depth` of the hit is the length of the ray.
-    pub(crate) fn cast_ray(
+    pub(crate) fn cast_ray_seen_by_both(
         &self,
         object_from_sensor: &Pose,
         origin: &Vec3,
@@ -125,20 +125,20 @@ mod tests {
         let down = nalgebra::UnitQuaternion::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI);
         let pose = Pose::from_parts(nalgebra::Translation3::new(0.0, 0.0, 0.5), down);
         let eye = Vec3::zeros();
-        let hit = scene.cast_ray(&pose, &eye, &Vec3::z(), &eye).unwrap();
+        let hit = scene.cast_ray_seen_by_both(&pose, &eye, &Vec3::z(), &eye).unwrap();
         assert!((hit.point - Vec3::z() * 0.45).norm() < 1e-9 && hit.on_object);
         assert!((hit.cosine - 1.0).abs() < 1e-9 && (hit.depth - 0.45).abs() < 1e-9);
         // At 45 degrees the table is met beside the cube.
         let slanted = Vec3::new(1.0, 0.0, 1.0).normalize();
-        let hit = scene.cast_ray(&pose, &eye, &slanted, &eye).unwrap();
+        let hit = scene.cast_ray_seen_by_both(&pose, &eye, &slanted, &eye).unwrap();
         assert!((hit.point - Vec3::new(0.55, 0.0, 0.55)).norm() < 1e-9, "{:?}", hit.point);
         assert_eq!((hit.on_object, hit.label()), (false, SURROUNDINGS_LABEL));
         assert!((hit.cosine - 0.5f64.sqrt()).abs() < 1e-9);
         // Past the edge of the table there is nothing.
         let flat = Vec3::new(1.0, 0.0, 0.4).normalize();
-        assert!(scene.cast_ray(&pose, &eye, &flat, &eye).is_none());
+        assert!(scene.cast_ray_seen_by_both(&pose, &eye, &flat, &eye).is_none());
         // A second eye behind the cube does not see the table in front of it.
         let behind = Vec3::new(-0.5, 0.0, 0.49);
-        assert!(scene.cast_ray(&pose, &eye, &slanted, &behind).is_none());
+        assert!(scene.cast_ray_seen_by_both(&pose, &eye, &slanted, &behind).is_none());
     }
 }

@@ -113,7 +113,12 @@ pub(crate) fn scan(
 fn cast_pixel_ray(scene: &SimulatedScene, object_from_sensor: &Pose, index: usize) -> Option<Hit> {
     let right_camera = Vec3::x() * BASELINE_M;
     let direction = ray(index).normalize();
-    let hit = scene.cast_ray(object_from_sensor, &Vec3::zeros(), &direction, &right_camera)?;
+    let hit = scene.cast_ray_seen_by_both(
+        object_from_sensor,
+        &Vec3::zeros(),
+        &direction,
+        &right_camera,
+    )?;
     let right_column = focal_length() * (hit.point.x - BASELINE_M) / hit.point.z;
     // Outside the right image there is nothing to match.
     (right_column.abs() <= IMAGE_SIZE[0] / 2.0).then_some(Hit { depth: hit.point.z, ..hit })

@@ -18,7 +18,7 @@ impl ViewSpace {
     /// # Errors
     /// [`Error::Input`] if the pose is not finite or the scan's vectors differ in length.
     pub fn integrate(&mut self, scan: &Scan, object_from_sensor: &Pose) -> Result<()> {
-        self.integrate_with(scan, &Scan::default(), object_from_sensor)
+        self.integrate_with_beyond(scan, &Scan::default(), object_from_sensor)
     }
 
     /// As [`ViewSpace::integrate`], with returns of the same scan that lie `beyond` the object, on
@@ -26,7 +26,7 @@ impl ViewSpace {
     ///
     /// # Errors
     /// As [`ViewSpace::integrate`].
-    pub fn integrate_with(
+    pub fn integrate_with_beyond(
         &mut self,
         scan: &Scan,
         beyond: &Scan,

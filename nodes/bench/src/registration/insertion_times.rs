@@ -1,7 +1,7 @@
 //! The time that a scan takes which comes after many others.
 
 use super::case::RegistrationCase;
-use super::outcome::{PreparedScans, reported_poses};
+use super::outcome::{PreparedScans, robot_poses};
 use puffer_core::assess::quantile;
 use puffer_core::register::{RegisterParams, Registrar};
 use puffer_core::simulate::SimulatedScans;
@@ -35,7 +35,7 @@ impl InsertionTimes {
     ) -> InsertionTimes {
         let mut registrar = Registrar::new(scans.pose_sigma, params.clone());
         let mut milliseconds = Vec::new();
-        for (scan, pose) in prepared.scans.iter().zip(reported_poses(scans)) {
+        for (scan, pose) in prepared.scans.iter().zip(robot_poses(scans)) {
             let started = Instant::now();
             registrar.add(scan, &pose);
             milliseconds.push(started.elapsed().as_secs_f64() * 1e3);

@@ -94,7 +94,7 @@ impl RegistrationOutcome {
     ) -> Result<RegistrationOutcome> {
         let started = Instant::now();
         let sigma = Some(scans.pose_sigma);
-        let priors = reported_poses(scans);
+        let priors = robot_poses(scans);
         let found = register(&prepared.scans, &priors, sigma, params, &Progress::silent())?;
         Ok(RegistrationOutcome {
             refused: Some(found.verdicts.iter().filter(|v| v.status != Status::Accepted).count()),
@@ -134,7 +134,7 @@ impl RegistrationOutcome {
 }
 
 /// The poses that the robot reports.
-pub(super) fn reported_poses(scans: &SimulatedScans) -> Vec<Pose> {
+pub(super) fn robot_poses(scans: &SimulatedScans) -> Vec<Pose> {
     scans.views.iter().map(|v| v.reported_pose).collect()
 }
 

@@ -1,7 +1,7 @@
 //! The figures of a case, and how they are printed.
 
 use super::case::RegistrationCase;
-use super::outcome::{RegistrationOutcome, reported_poses};
+use super::outcome::{RegistrationOutcome, robot_poses};
 use anyhow::Result;
 use puffer_core::Progress;
 use puffer_core::assess::{PoseErrors, PosedHits, pair_error, pose_errors, quantile};
@@ -113,7 +113,7 @@ impl RegistrationRow {
         outcome: RegistrationOutcome,
     ) -> Result<RegistrationRow> {
         let posed_hits = pose_hits(scans, &outcome.poses);
-        let reported_hits = pose_hits(scans, &reported_poses(scans));
+        let reported_hits = pose_hits(scans, &robot_poses(scans));
         Ok(RegistrationRow {
             robot_errors: pose_errors(&reported_hits, truth, &Progress::silent())?,
             pair_errors: outcome

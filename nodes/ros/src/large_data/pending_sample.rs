@@ -33,7 +33,7 @@ struct Transmission {
 
 /// Whether a tile should be sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum SendState {
+pub(crate) enum TileState {
     /// It was not sent yet, or is known to be lost.
     Unsent,
     /// It was sent and may still arrive.
@@ -55,11 +55,11 @@ impl PendingSample {
         self.transmissions.len()
     }
 
-    pub(crate) fn send_state(&self, index: usize, now: Instant) -> SendState {
+    pub(crate) fn tile_state(&self, index: usize, now: Instant) -> TileState {
         match self.transmissions[index].at {
-            None => SendState::Unsent,
-            Some(at) if now.duration_since(at) < RETRANSMIT_TIMEOUT => SendState::InFlight,
-            Some(_) => SendState::Overdue,
+            None => TileState::Unsent,
+            Some(at) if now.duration_since(at) < RETRANSMIT_TIMEOUT => TileState::InFlight,
+            Some(_) => TileState::Overdue,
         }
     }
 
@@ -73,7 +73,7 @@ impl PendingSample {
 
     /// Marks those tiles as lost that a reader lacks although it has one that was sent later: tiles
     /// of one writer travel in order. Returns how many they are.
-    pub(crate) fn mark_lost(&mut self, reader_has: impl Fn(usize) -> bool) -> usize {
+    pub(crate) fn detect_losses(&mut self, reader_has: impl Fn(usize) -> bool) -> usize {
         let arrived = (0..self.tile_count()).filter(|&i| reader_has(i));
         let Some(newest) = arrived.map(|i| self.transmissions[i].order).max() else { return 0 };
         let mut lost = 0;
@@ -135,12 +135,12 @@ mod tests {
     fn a_tile_is_overdue_when_its_acknowledgement_is() {
         let start = Instant::now();
         let mut sample = sample(MAX_TILE_BYTES);
-        assert_eq!(sample.send_state(0, start), SendState::Unsent);
+        assert_eq!(sample.tile_state(0, start), TileState::Unsent);
         assert!(!sample.note_sent(0, 1, start));
-        assert_eq!(sample.send_state(0, start), SendState::InFlight);
-        assert_eq!(sample.send_state(0, start + RETRANSMIT_TIMEOUT), SendState::Overdue);
+        assert_eq!(sample.tile_state(0, start), TileState::InFlight);
+        assert_eq!(sample.tile_state(0, start + RETRANSMIT_TIMEOUT), TileState::Overdue);
         assert!(sample.note_sent(0, 2, start + RETRANSMIT_TIMEOUT));
-        assert_eq!(sample.send_state(0, start + RETRANSMIT_TIMEOUT), SendState::InFlight);
+        assert_eq!(sample.tile_state(0, start + RETRANSMIT_TIMEOUT), TileState::InFlight);
     }
 
     #[test]
@@ -150,12 +150,12 @@ mod tests {
         for index in 0..3 {
             sample.note_sent(index, index as u64 + 1, now);
         }
-        assert_eq!(sample.mark_lost(|_| false), 0, "nothing has arrived yet");
+        assert_eq!(sample.detect_losses(|_| false), 0, "nothing has arrived yet");
         // Tile 1 arrived: tile 0 was sent before it and is lost, tile 2 may still come.
-        assert_eq!(sample.mark_lost(|index| index == 1), 1);
-        let states = [0, 1, 2, 3].map(|index| sample.send_state(index, now));
-        let [unsent, in_flight] = [SendState::Unsent, SendState::InFlight];
+        assert_eq!(sample.detect_losses(|index| index == 1), 1);
+        let states = [0, 1, 2, 3].map(|index| sample.tile_state(index, now));
+        let [unsent, in_flight] = [TileState::Unsent, TileState::InFlight];
         assert_eq!(states, [unsent, in_flight, in_flight, unsent]);
-        assert_eq!(sample.mark_lost(|index| index == 1), 0, "a loss is counted once");
+        assert_eq!(sample.detect_losses(|index| index == 1), 0, "a loss is counted once");
     }
 }

@@ -1,7 +1,7 @@
 //! The writer's half of the protocol: which tile to send when.
 
 use super::congestion_window::CongestionWindow;
-use super::pending_sample::{PendingSample, SendState};
+use super::pending_sample::{PendingSample, TileState};
 use super::reader_state::ReaderState;
 use super::tile::{ALL_WRITERS, EndpointId, Tile, TileAck};
 use bytes::Bytes;
@@ -161,7 +161,7 @@ impl TileSender {
             self.window.on_arrival(arrived);
         }
         let sample = self.pending.iter_mut().find(|s| s.sequence == sequence);
-        if sample.is_some_and(|sample| sample.mark_lost(|i| reader.have.contains(i)) > 0) {
+        if sample.is_some_and(|sample| sample.detect_losses(|i| reader.have.contains(i)) > 0) {
             self.window.on_loss(now);
         }
         self.release();
@@ -241,10 +241,10 @@ impl TileSender {
             if answering.iter().all(|id| self.readers[id].has_tile(sequence, i)) {
                 continue;
             }
-            match self.pending[k].send_state(i, now) {
-                SendState::InFlight => in_flight += 1,
+            match self.pending[k].tile_state(i, now) {
+                TileState::InFlight => in_flight += 1,
                 state if to_send.len() < self.window.tiles() => {
-                    is_overdue |= state == SendState::Overdue;
+                    is_overdue |= state == TileState::Overdue;
                     to_send.push(i);
                 }
                 _ => {}
