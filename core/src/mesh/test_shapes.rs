@@ -58,6 +58,23 @@ pub(crate) fn torus(major: f64, minor: f64, n: u32, m: u32) -> Mesh {
     mesh
 }
 
+/// An octahedron with its corners on the axes at distance 1, outward, in the order x, -x, y, -y, z,
+/// -z.
+pub(crate) fn octahedron() -> Mesh {
+    let corners = [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()];
+    let triangles = vec![
+        [0, 2, 4],
+        [2, 1, 4],
+        [1, 3, 4],
+        [3, 0, 4],
+        [2, 0, 5],
+        [1, 2, 5],
+        [3, 1, 5],
+        [0, 3, 5],
+    ];
+    Mesh::new(corners.to_vec(), triangles)
+}
+
 /// An axis-aligned box with 12 triangles.
 pub(crate) fn cuboid(min: Vec3, max: Vec3) -> Mesh {
     let vertices = (0..8)

@@ -222,7 +222,9 @@ impl Spaces {
     /// Distance from `from` along the unit vector `direction` to the first voxel of the surface,
     /// metres.
     fn distance_to_surface(&self, from: &Vec3, direction: &Vec3) -> Option<f64> {
-        self.surface.find_on_ray(from, direction, self.reach, |occupied| occupied).map(|(_, d)| d)
+        self.surface
+            .find_first_on_ray(from, direction, self.reach, |occupied| occupied)
+            .map(|(_, d)| d)
     }
 
     /// Marks the voxels that triangles of `mesh` touch, by points half a voxel apart.

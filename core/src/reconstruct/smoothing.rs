@@ -115,7 +115,7 @@ impl MeanDisplacement {
 mod tests {
     use super::*;
     use crate::mesh::remeshing::vertex_normals;
-    use crate::mesh::{Mesh, min_angles, test_shapes};
+    use crate::mesh::{min_angles, test_shapes};
 
     fn bumpy() -> HalfEdgeMesh {
         let mut shape = test_shapes::sphere(1.0, 3);
@@ -140,19 +140,9 @@ mod tests {
 
     #[test]
     fn a_vertex_of_an_octahedron_moves_to_the_middle_of_its_four_neighbours() {
-        let corners = [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()];
-        let triangles = vec![
-            [0, 2, 4],
-            [2, 1, 4],
-            [1, 3, 4],
-            [3, 0, 4],
-            [2, 0, 5],
-            [1, 2, 5],
-            [3, 1, 5],
-            [0, 3, 5],
-        ];
-        let mesh = HalfEdgeMesh::new(&Mesh::new(corners.to_vec(), triangles)).unwrap();
-        for (offset, corner) in mean_neighbour_offsets(&mesh).iter().zip(&corners) {
+        let octahedron = test_shapes::octahedron();
+        let mesh = HalfEdgeMesh::new(&octahedron).unwrap();
+        for (offset, corner) in mean_neighbour_offsets(&mesh).iter().zip(&octahedron.vertices) {
             assert!((offset + corner).norm() < 1e-15, "{offset}");
         }
         // All its triangles are regular: regularising moves nothing.

@@ -63,7 +63,7 @@ impl<T: Copy + Default + PartialEq> VoxelSpace<T> {
 
     /// The first voxel on the ray from `origin` along the unit vector `direction`, up to `reach`
     /// (metres), for whose value `is_wanted` is true, and the distance at which the ray enters it.
-    pub fn find_on_ray(
+    pub fn find_first_on_ray(
         &self,
         origin: &Vec3,
         direction: &Vec3,
@@ -113,10 +113,14 @@ mod tests {
         space.set([10, 0, 0], 1_u8);
         space.set([14, 0, 0], 2_u8);
         let origin = Vec3::new(0.1, 0.1, 0.1);
-        let (voxel, distance) = space.find_on_ray(&origin, &Vec3::x(), 10.0, |v| v > 0).unwrap();
+        let (voxel, distance) =
+            space.find_first_on_ray(&origin, &Vec3::x(), 10.0, |v| v > 0).unwrap();
         assert_eq!(voxel, [10, 0, 0]);
         assert!((distance - 4.9).abs() < 1e-12);
-        assert_eq!(space.find_on_ray(&origin, &Vec3::x(), 10.0, |v| v == 2).unwrap().0, [14, 0, 0]);
-        assert!(space.find_on_ray(&origin, &Vec3::x(), 4.0, |v| v > 0).is_none());
+        assert_eq!(
+            space.find_first_on_ray(&origin, &Vec3::x(), 10.0, |v| v == 2).unwrap().0,
+            [14, 0, 0]
+        );
+        assert!(space.find_first_on_ray(&origin, &Vec3::x(), 4.0, |v| v > 0).is_none());
     }
 }

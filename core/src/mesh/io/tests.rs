@@ -1,23 +1,14 @@
 use super::*;
 use crate::geometry::{Pose, Vec3};
+use crate::mesh::test_shapes;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 
 /// An octahedron with every attribute; the coordinates are exact in single precision.
 fn octahedron() -> Mesh {
-    let axes = [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()];
-    let triangles = vec![
-        [0, 2, 4],
-        [2, 1, 4],
-        [1, 3, 4],
-        [3, 0, 4],
-        [2, 0, 5],
-        [1, 2, 5],
-        [3, 1, 5],
-        [0, 3, 5],
-    ];
-    let mut mesh = Mesh::new(axes.iter().map(|a| a * 0.125 + Vec3::z()).collect(), triangles);
+    let mut mesh = test_shapes::octahedron();
+    mesh.vertices.iter_mut().for_each(|v| *v = *v * 0.125 + Vec3::z());
     mesh.compute_normals();
     mesh.sigma = vec![0.0, 2f64.powi(-12), 2f64.powi(-11), f64::NAN, 2f64.powi(-13), 0.0];
     mesh.observed = vec![true, true, true, false, true, true];
